@@ -20,10 +20,10 @@ using nlohmann::json;
 
 constexpr const char* kSchema = "duet.certificate/1";
 
-void count(conformance::Verdict verdict, Tally& tally) {
-  if (verdict == conformance::Verdict::kPass) ++tally.passed;
-  if (verdict == conformance::Verdict::kFail) ++tally.failed;
-  if (verdict == conformance::Verdict::kDeviation) ++tally.deviations;
+void count(conformance::CheckStatus verdict, Tally& tally) {
+  if (verdict == conformance::CheckStatus::kPass) ++tally.passed;
+  if (verdict == conformance::CheckStatus::kFail) ++tally.failed;
+  if (verdict == conformance::CheckStatus::kDeviation) ++tally.deviations;
 }
 
 CertifiedEngine certified(const conformance::EngineReport& report, const std::string& profile) {
@@ -37,7 +37,7 @@ CertifiedEngine certified(const conformance::EngineReport& report, const std::st
                          .accuracy = {}};
   for (const conformance::SceneReport& scene : report.scenes) {
     for (const Measurement& found : scene.run.measurements)
-      engine.measurements.push_back({found, conformance::verdict_on(report.engine, found)});
+      engine.measurements.push_back({found, conformance::status_of(report.engine, found)});
     if (!scene.run.accuracy.empty())
       engine.accuracy.push_back({scene.name, scene.run.error, scene.run.error_unit, scene.run.accuracy});
   }
@@ -116,11 +116,11 @@ void read_list(JsonFields& fields, const std::string& key, const std::string& wh
   for (std::size_t i = 0; i < list.size(); ++i) read(list[i], fmt::format("{}: {}[{}]", what, key, i));
 }
 
-conformance::Verdict read_verdict(const std::string& text, const std::string& what) {
-  for (const conformance::Verdict verdict :
-       {conformance::Verdict::kPass, conformance::Verdict::kFail, conformance::Verdict::kDeviation})
+conformance::CheckStatus read_status(const std::string& text, const std::string& what) {
+  for (const conformance::CheckStatus verdict :
+       {conformance::CheckStatus::kPass, conformance::CheckStatus::kFail, conformance::CheckStatus::kDeviation})
     if (text == conformance::to_string(verdict)) return verdict;
-  throw InputError(fmt::format("{}: verdict is '{}', expected pass, FAIL or deviation", what, shown(text)));
+  throw InputError(fmt::format("{}: verdict is '{}', expected pass, FAIL or deviation", what, excerpt(text)));
 }
 
 CertifiedMeasurement read_measurement(const json& object, const std::string& what) {
@@ -136,7 +136,7 @@ CertifiedMeasurement read_measurement(const json& object, const std::string& wha
   entry.found.relative = fields.boolean("relative");
   entry.found.across_engines = fields.boolean("across_engines");
   entry.found.note = fields.text("note");
-  entry.verdict = read_verdict(fields.text("verdict"), what);
+  entry.verdict = read_status(fields.text("verdict"), what);
   fields.refuse_unknown();
   return entry;
 }
@@ -235,7 +235,7 @@ Certificate load_certificate(const std::string& path) {
   const json document = parse_json(read_text(path), what);
   JsonFields fields(document, what);
   if (const std::string schema = fields.text("schema"); schema != kSchema)
-    throw InputError(fmt::format("{}: schema is '{}', expected '{}'", what, shown(schema), kSchema));
+    throw InputError(fmt::format("{}: schema is '{}', expected '{}'", what, excerpt(schema), kSchema));
   Certificate certificate;
   certificate.effort = fields.text("effort");
   certificate.created_at = fields.text("created_at");

@@ -15,7 +15,7 @@ namespace duet {
 
 struct CertifiedMeasurement {
   conformance::Measurement found;
-  conformance::Verdict verdict = conformance::Verdict::kFail;
+  conformance::CheckStatus verdict = conformance::CheckStatus::kFail;
 };
 
 // Error against cost of one scene, coarsest step first.

@@ -171,8 +171,8 @@ PolicyCheck check_policy(const std::string& use, const std::shared_ptr<const Rob
 }
 
 std::string describe(const PolicyCheck& check) {
-  std::string text = fmt::format("policy '{}': {}\nclip: {}, its first frame\n", shown(check.info.name),
-                                 shown(check.info.about), check.clip);
+  std::string text = fmt::format("policy '{}': {}\nclip: {}, its first frame\n", excerpt(check.info.name),
+                                 excerpt(check.info.about), check.clip);
   for (const ShownInput& input : check.inputs) text += range_of(input);
   if (!check.output.empty()) text += fmt::format("asked for: {}\n", check.output);
   text += fmt::format("came back: {} references at 50 Hz\n", check.plan.size());

@@ -30,7 +30,7 @@ namespace {
 constexpr std::size_t kLongestMessage = 4000;
 
 int fail(int code, const std::string& message) {
-  print_error(fmt::format("duet: {}\n", shown(with_short_names(message), kLongestMessage)));
+  print_error(fmt::format("duet: {}\n", excerpt(with_short_names(message), kLongestMessage)));
   return code;
 }
 

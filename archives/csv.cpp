@@ -90,7 +90,7 @@ std::optional<double> CsvReader::number(std::string_view field) const {
 
 void CsvReader::fail(const std::string& fault) const {
   const std::string place = line_ == 0 ? "" : fmt::format("line {}: ", line_);
-  throw InputError(fmt::format("'{}': {}{}", shown(name_, kShownSentence), place, fault));
+  throw InputError(fmt::format("'{}': {}{}", excerpt(name_, kShownSentence), place, fault));
 }
 
 void CsvReader::read_row() {
@@ -146,7 +146,7 @@ void require_header(CsvReader& rows, std::span<const std::string> names) {
   const auto found = rows.fields();
   if (!std::equal(found.begin(), found.end(), names.begin(), names.end()))
     rows.fail(fmt::format("expected the header '{}', found '{}'", fmt::join(names, ","),
-                          shown(fmt::format("{}", fmt::join(found, ",")))));
+                          excerpt(fmt::format("{}", fmt::join(found, ",")))));
 }
 
 void CsvReader::take_line_end() {

@@ -147,7 +147,7 @@ struct McapScan {
     }
     if (packing != "zstd" || size > kMostChunk)
       throw InputError(fmt::format("{}: expected chunks of at most {} bytes packed by zstd, found {} bytes by '{}'",
-                                   name, kMostChunk, size, shown(packing)));
+                                   name, kMostChunk, size, excerpt(packing)));
     std::vector<std::byte> unpacked(size);
     const std::size_t found = ZSTD_decompress(unpacked.data(), unpacked.size(), packed.data(), packed.size());
     if (ZSTD_isError(found) != 0U || found != size)

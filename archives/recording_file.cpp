@@ -121,7 +121,7 @@ class Reader {
 };
 
 [[noreturn]] void refuse(const Npz& npz, const std::string& problem) {
-  throw InputError(fmt::format("'{}': {}", npz.name(), shown(problem, kShownSentence)));
+  throw InputError(fmt::format("'{}': {}", npz.name(), excerpt(problem, kShownSentence)));
 }
 
 // Unit to 1e-6, or not a number (a diverged run: the reader has refused it in any other).

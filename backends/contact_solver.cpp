@@ -55,7 +55,7 @@ double largest_eigenvalue(const Eigen::Matrix2d& m) {
 
 }  // namespace
 
-Softness spring_damper(double stiffness, double damping, double dt) {
+ConstraintSoftness spring_damper(double stiffness, double damping, double dt) {
   const double both = std::max(dt * stiffness + damping, kSoftest);
   return {.erp = dt * stiffness / both, .cfm = 1.0 / both};
 }
@@ -76,7 +76,7 @@ ContactSolver::ContactSolver(const RobotModel& robot, std::size_t contacts, doub
 
 void ContactSolver::clear() { used_ = 0; }
 
-ContactSolver::Row& ContactSolver::next_row(const Softness& softness) {
+ContactSolver::Row& ContactSolver::next_row(const ConstraintSoftness& softness) {
   Row& row = rows_[used_++];
   for (const int k : row.support) {
     row.J.row(k).setZero();
@@ -91,8 +91,8 @@ ContactSolver::Row& ContactSolver::next_row(const Softness& softness) {
   return row;
 }
 
-void ContactSolver::add(const ContactPoint& point, const Softness& softness, std::span<const Eigen::Matrix3d> R_WL,
-                        std::span<const Eigen::Vector3d> p_WL) {
+void ContactSolver::add(const ContactPoint& point, const ConstraintSoftness& softness,
+                        std::span<const Eigen::Matrix3d> R_WL, std::span<const Eigen::Vector3d> p_WL) {
   Row& row = next_row(softness);
   row.axes_W.col(0) = point.n_W;
   row.axes_W.col(1) = point.n_W.unitOrthogonal();
@@ -120,7 +120,7 @@ void ContactSolver::add_link(Row& row, int link, double sign, const Eigen::Vecto
   for (int k = 5; k >= 0; --k) row.support.push_back(k);
 }
 
-void ContactSolver::add_stop(int joint, double side, double depth, const Softness& softness) {
+void ContactSolver::add_stop(int joint, double side, double depth, const ConstraintSoftness& softness) {
   Row& row = next_row(softness);
   row.J(6 + joint, 0) = side;
   for (int i = joint + 1; i > 0; i = robot_->links[i].parent) row.support.push_back(5 + i);

@@ -18,12 +18,12 @@
 namespace duet {
 
 // The softness of a row: the share of the depth that one step removes, and the compliance [m/(N s)].
-struct Softness {
+struct ConstraintSoftness {
   double erp = 1.0;
   double cfm = 0.0;
 };
 // The softness of a spring [N/m] and a damper [N s/m] in parallel, taken implicitly over dt. Both 0: no force.
-Softness spring_damper(double stiffness, double damping, double dt);
+ConstraintSoftness spring_damper(double stiffness, double damping, double dt);
 
 class ContactSolver {
  public:
@@ -33,11 +33,11 @@ class ContactSolver {
 
   void clear();
   // A touching point; with the poses of all links.
-  void add(const ContactPoint& point, const Softness& softness, std::span<const Eigen::Matrix3d> R_WL,
+  void add(const ContactPoint& point, const ConstraintSoftness& softness, std::span<const Eigen::Matrix3d> R_WL,
            std::span<const Eigen::Vector3d> p_WL);
   // The stop of a joint, which pushes towards `side`: +1 at the lower stop, -1 at the upper. `depth` [rad] is how far
   // it is passed; a negative one is a gap, which the step may close. At most one a joint.
-  void add_stop(int joint, double side, double depth, const Softness& softness);
+  void add_stop(int joint, double side, double depth, const ConstraintSoftness& softness);
 
   // The generalised velocity (robots/kinematics.h) from v0 to v, with the factor of A.
   void solve(const TreeFactor& factor, Eigen::VectorXd& v);
@@ -60,7 +60,7 @@ class ContactSolver {
     Eigen::Vector2d drag;  // of a sliding contact: direction of its friction
     int at = 0;            // of its first unknown in the linear system
   };
-  Row& next_row(const Softness& softness);
+  Row& next_row(const ConstraintSoftness& softness);
   void add_link(Row& row, int link, double sign, const Eigen::Vector3d& p_W, std::span<const Eigen::Matrix3d> R_WL,
                 std::span<const Eigen::Vector3d> p_WL) const;
   void project(const TreeFactor& factor, const Eigen::VectorXd& v);

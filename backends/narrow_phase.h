@@ -52,7 +52,7 @@ struct ContactPoint {
   Eigen::Vector3d n_W = Eigen::Vector3d::UnitZ();  // unit, from the other side towards the link
   double depth = 0.0;                              // > 0 [m]
   double friction = 0.0;
-  Skin skin = {};                                       // of a human contact; elsewhere the engine's own rigid contact
+  ContactCompliance skin = {};                          // of a human contact; elsewhere the engine's own rigid contact
   Eigen::Vector3d v_other_W = Eigen::Vector3d::Zero();  // of the human or the ground at p_W [m/s]; not of a link
 };
 

@@ -49,17 +49,17 @@ void PhysicsBackend::do_restore(std::span<const double> values) {
   read_from(values.subspan(MovingPartner::kValues + pushes_.size()));
 }
 
-void LinkPushes::clear() {
+void ExternalForces::clear() {
   std::fill(pushes_.begin(), pushes_.end(), Push{});
   any_ = false;
 }
 
-void LinkPushes::set(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_L) {
+void ExternalForces::set(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_L) {
   pushes_[link] = {f_W, p_L};
   any_ = true;
 }
 
-void LinkPushes::append_to(std::vector<double>& values) const {
+void ExternalForces::append_to(std::vector<double>& values) const {
   values.push_back(any_ ? 1.0 : 0.0);
   for (const Push& push : pushes_) {
     values.insert(values.end(), push.f_W.data(), push.f_W.data() + 3);
@@ -67,7 +67,7 @@ void LinkPushes::append_to(std::vector<double>& values) const {
   }
 }
 
-void LinkPushes::read_from(std::span<const double> values) {
+void ExternalForces::read_from(std::span<const double> values) {
   any_ = values[0] != 0.0;
   const double* from = values.data() + 1;
   for (Push& push : pushes_) {

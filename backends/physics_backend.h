@@ -15,14 +15,14 @@
 namespace duet {
 
 // The forces of Backend::push: each keeps its direction in W and acts at a point fixed to its link.
-class LinkPushes {
+class ExternalForces {
  public:
   struct Push {
     Eigen::Vector3d f_W = Eigen::Vector3d::Zero();
     Eigen::Vector3d p_L = Eigen::Vector3d::Zero();
   };
 
-  explicit LinkPushes(std::size_t links) : pushes_(links) {}
+  explicit ExternalForces(std::size_t links) : pushes_(links) {}
 
   void clear();
   void set(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_L);
@@ -45,7 +45,7 @@ class PhysicsBackend : public Backend {
   explicit PhysicsBackend(const Scene& scene);
 
   MovingPartner partner_;
-  LinkPushes pushes_;
+  ExternalForces pushes_;
   NarrowPhase narrow_phase_;
 
  private:

@@ -58,7 +58,7 @@ AttemptHeader read_header(std::string_view line, const std::string& path) {
   const nlohmann::json json = parse_json(line, path);
   JsonFields fields(json, path + ":1");
   if (const std::string schema = fields.text("schema"); schema != kAttemptSchema)
-    throw InputError(fmt::format("{}:1: expected schema {}, found {}", path, kAttemptSchema, shown(schema)));
+    throw InputError(fmt::format("{}:1: expected schema {}, found {}", path, kAttemptSchema, excerpt(schema)));
   AttemptHeader header;
   header.shard = fields.integer("shard");
   header.node = fields.text("node");
@@ -151,8 +151,8 @@ AttemptHeader new_attempt(std::int64_t shard, const std::string& plan) {
 AttemptWriter::AttemptWriter(const std::string& run, const AttemptHeader& header) {
   const std::string name = fmt::format("{}/{}-{}-{:08x}", shard_folder(header.shard), plain(header.node), header.pid,
                                        std::random_device()());
-  journal_ = inside(run, name + ".log");
-  rows_file_ = inside(run, name + ".jsonl");
+  journal_ = join_without_links(run, name + ".log");
+  rows_file_ = join_without_links(run, name + ".jsonl");
   std::error_code error;
   fs::create_directories(fs::path(journal_).parent_path(), error);
   if (error) throw StorageError(fmt::format("cannot write '{}': {}", journal_, error.message()));

@@ -34,7 +34,7 @@ class Merger {
     std::ranges::sort(kept_.suite.engines);
   }
 
-  [[nodiscard]] const KeptSuite& kept() const { return kept_; }
+  [[nodiscard]] const ArchivedSuite& kept() const { return kept_; }
 
  private:
   void add(const Run& run) {
@@ -66,7 +66,7 @@ class Merger {
   }
 
   std::string folder_;
-  KeptSuite kept_;
+  ArchivedSuite kept_;
 };
 
 // The lines that say who resumed which of the runs, each line once.
@@ -244,14 +244,14 @@ nlohmann::json hosts_json(const MergeInputs& inputs, const MergedRows& rows) {
 constexpr std::uint64_t kMerging = 2;  // byte of the run's lock file (rows/folder/run_directory.cpp)
 
 void merge_in_place(const std::string& run, const MergeOptions& options, MergeSummary& summary) {
-  FolderLock lock(inside(run, "lock"));
+  FolderLock lock(join_without_links(run, "lock"));
   const ScopedLock merging(lock, kMerging);
   const MergeInputs inputs({run}, options.without_nodes);
-  summary.rows =
-      merge_rows(inputs.sources(), inputs.runs().front().info, inside(run, "episodes.jsonl"), options.budget);
+  summary.rows = merge_rows(inputs.sources(), inputs.runs().front().info, join_without_links(run, "episodes.jsonl"),
+                            options.budget);
   summary.written = summary.rows.violations == 0;
   inputs.say_gaps(summary);
-  write_file(inside(run, "hosts.json"), dumped(hosts_json(inputs, summary.rows), 1) + "\n");
+  write_file(join_without_links(run, "hosts.json"), dumped(hosts_json(inputs, summary.rows), 1) + "\n");
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ std::vector<PlannedClip> keep_clips(const std::vector<PairedMotion>& clips, cons
   std::vector<PlannedClip> planned;
   for (const PairedMotion& clip : clips) {
     const std::string name = fmt::format("clips/{:06}.npz", planned.size());
-    const std::string file = inside(directory, name);
+    const std::string file = join_without_links(directory, name);
     save_paired_motion(clip, file);
     planned.push_back({std::string(to_string(clip.task)), clip.clip_id, name, sha256_file(file)});
   }
@@ -50,7 +50,7 @@ class Planner {
       : experiment_(experiment), directory_(std::move(directory)), per_clip_(episodes_of_clip()) {}
 
   // Runs the first clip of each engine and controller that has no cost yet.
-  void measure(std::map<std::string, double>& costs, const StopSign& stop, Progress& progress) {
+  void measure(std::map<std::string, double>& costs, const StopToken& stop, Progress& progress) {
     progress.start("measuring costs", static_cast<int>(uncosted(costs).size()), "engines and controllers");
     for (const std::int64_t begin : uncosted(costs)) {
       costs[cost_name(experiment_.at(begin))] = std::max(kLeastCost, measured(begin, stop));
@@ -116,11 +116,11 @@ class Planner {
   }
 
   // All policies on one clip, an episode each. [s of one core per s of motion]
-  double measured(std::int64_t begin, const StopSign& stop) {
+  double measured(std::int64_t begin, const StopToken& stop) {
     double cost = 0.0, motion = 0.0;
     const bool records = experiment_.suite().record != RecordTrajectories::kNone;
     const EpisodeOverrides overrides{.stop_asked = [&] { return stop.asked(); },
-                                     .trajectories = records ? inside(directory_, "trajectories") : ""};
+                                     .trajectories = records ? join_without_links(directory_, "trajectories") : ""};
     for (std::int64_t place = begin; place < begin + per_clip_; ++place) {
       const EpisodeSpec spec = experiment_.at(place);
       if (spec.episode > 0) break;
@@ -143,7 +143,7 @@ class Planner {
   std::vector<std::pair<std::int64_t, EpisodeRow>> pilots_;
 };
 
-std::vector<std::string> lacks(const Experiment& experiment, const RunPart& part) {
+std::vector<std::string> lacks(const Experiment& experiment, const EpisodeFilter& part) {
   std::vector<std::string> warnings;
   const char* what = "; its episodes are rows with outcome `unsupported`";
   const std::vector<std::string>& engines = experiment.suite().engines;
@@ -164,7 +164,7 @@ void check_costs(const std::map<std::string, double>& costs, const std::set<std:
 
 }  // namespace
 
-PlanSummary plan_run(Suite suite, const std::string& directory, const PlanOptions& options, const StopSign& stop,
+PlanSummary plan_run(Suite suite, const std::string& directory, const PlanOptions& options, const StopToken& stop,
                      Progress& progress) {
   suite.require_clips();
   refuse_planned(directory);
@@ -176,7 +176,7 @@ PlanSummary plan_run(Suite suite, const std::string& directory, const PlanOption
   const RunIdentity& identity = experiment.identity();
   summary.warnings = lacks(experiment, options.part);
   for (const std::string& note : experiment.bodies().notes()) progress.note(note);
-  const KeptSuite kept = kept_suite(experiment.suite(), directory, identity.files);
+  const ArchivedSuite kept = archive_inputs(experiment.suite(), directory, identity.files);
   RunDirectory run = RunDirectory::open(directory, new_run_info(experiment, kept, options.argv, options.certificate));
   if (run.size() > 0)
     throw InputError(fmt::format("'{}' has {} rows of a `duet run`: plan in another folder", directory, run.size()));
@@ -193,7 +193,7 @@ PlanSummary plan_run(Suite suite, const std::string& directory, const PlanOption
   planner.measure(plan.costs, stop, progress);
   plan.shards = cut_shards(planner.blocks(plan.costs), options.shards);
   for (Shard& shard : plan.shards) shard.keys = planner.keys(shard);
-  run.ask_for(options.part, plan.episodes, [&](const std::vector<RunPart>&) { return plan.episodes; });
+  run.ask_for(options.part, plan.episodes, [&](const std::vector<EpisodeFilter>&) { return plan.episodes; });
   write_shard_plan(plan, directory);
   planner.keep_pilots(plan);
   summary.pilots = static_cast<std::int64_t>(planner.pilots());
@@ -211,8 +211,8 @@ ShardPlan checked_plan(const std::string& path, const std::vector<std::string>& 
 }
 
 // That it was planned with.
-RunPart part_of(const Run& head) {
-  return head.info.plan && head.info.plan->parts.size() == 1 ? head.info.plan->parts.front() : RunPart();
+EpisodeFilter part_of(const Run& head) {
+  return head.info.plan && head.info.plan->parts.size() == 1 ? head.info.plan->parts.front() : EpisodeFilter();
 }
 
 // The part of a head's suite that is planned; the other policies and controllers need not be on this machine.

@@ -11,7 +11,7 @@
 #include "duet/execution/experiment.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/experiment/work/run_work.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/rows/folder/run_directory.h"
 #include "duet/rows/folder/run_info.h"
 
@@ -21,7 +21,7 @@ struct PlanOptions {
   std::int64_t shards = 0;              // 0: by their predicted cost
   std::map<std::string, double> costs;  // as in ShardPlan, of engines and controllers that no pilot is to run for
   int threads = 1;                      // that prepare clips
-  RunPart part = {};                    // of the suite that is planned, as `duet run` takes it
+  EpisodeFilter part = {};              // of the suite that is planned, as `duet run` takes it
   std::vector<std::string> argv;
   nlohmann::json certificate;
 };
@@ -36,7 +36,7 @@ struct PlanSummary {
 // is planned when plan.json is there; a command that was killed before may be given again. Throws as run_suite, Stopped
 // after the sign, and InputError for a folder that is planned already or has rows; std::invalid_argument for costs of
 // what the suite does not have.
-PlanSummary plan_run(Suite suite, const std::string& directory, const PlanOptions& options, const StopSign& stop,
+PlanSummary plan_run(Suite suite, const std::string& directory, const PlanOptions& options, const StopToken& stop,
                      Progress& progress);
 
 // A planned run as a worker opens it: the suite from the folder, held against the plan. Nothing of it names a place on

@@ -60,7 +60,7 @@ struct SlurmOptions {
   std::vector<std::string> more;     // further options of sbatch, whole: "--exclude=n7"
   std::vector<std::string> set_up;   // lines that the script runs first: "module load ..."
   std::vector<std::string> program;  // words by which the nodes call duet: {"apptainer", "exec", "duet.sif", "duet"}
-  bool allow_programs = false;       // the workers may start what the plan names (experiment/plan/bodies.h)
+  bool allow_programs = false;       // the workers may start what the plan names (experiment/plan/embodiments.h)
   int largest_array = 1000;          // shards of one array (MaxArraySize)
 };
 

@@ -103,7 +103,7 @@ PlannedTraining read_training(JsonFields& fields, const std::string& name, const
   const json& options = fields.at("options");
   if (!options.is_object()) fail_plan(what, "an object under the key 'options'");
   for (const auto& [option, value] : options.items()) {
-    if (!value.is_string()) fail_plan(what, fmt::format("a text under the option '{}'", shown(option)));
+    if (!value.is_string()) fail_plan(what, fmt::format("a text under the option '{}'", excerpt(option)));
     check_training_option(training.train, option, value.get<std::string>(), what);
     training.options[option] = value.get<std::string>();
   }
@@ -111,9 +111,9 @@ PlannedTraining read_training(JsonFields& fields, const std::string& name, const
   if (std::ranges::find(known, training.train) == known.end())
     throw InputError(fmt::format("{}: {}", what, unknown_name_message("training", training.train, known)));
   if (!is_arm_name(training.arm))
-    fail_plan(what, fmt::format("an arm of letters, digits, '_' and '.', found '{}'", shown(training.arm)));
+    fail_plan(what, fmt::format("an arm of letters, digits, '_' and '.', found '{}'", excerpt(training.arm)));
   if (name != training.name())
-    fail_plan(what, fmt::format("the name '{}' of its arm and seed, found '{}'", training.name(), shown(name)));
+    fail_plan(what, fmt::format("the name '{}' of its arm and seed, found '{}'", training.name(), excerpt(name)));
   return training;
 }
 
@@ -161,7 +161,7 @@ PlannedClip read_clip(const json& object, const std::string& what) {
   fields.refuse_unknown();
   const std::filesystem::path file = std::filesystem::path(clip.file).lexically_normal();
   if (file.empty() || file.is_absolute() || *file.begin() == "..")
-    fail_plan(what, fmt::format("a file below the run directory, found '{}'", shown(clip.file)));
+    fail_plan(what, fmt::format("a file below the run directory, found '{}'", excerpt(clip.file)));
   return clip;
 }
 
@@ -202,7 +202,7 @@ void write_shard_plan(const ShardPlan& plan, const std::string& run) {
                        {"program", plan.program},   {"suite_hash", plan.suite_hash},
                        {"episodes", plan.episodes}, {"clips", std::move(clips)},
                        {"costs", plan.costs},       {"shards", std::move(shards)}};
-  write_file(inside(run, "plan.json"), dumped(object, 1) + "\n");
+  write_file(join_without_links(run, "plan.json"), dumped(object, 1) + "\n");
 }
 
 ShardPlan read_shard_plan(const std::string& run) {
@@ -213,10 +213,10 @@ ShardPlan read_shard_plan(const std::string& run) {
   const json object = parse_json(read_text(path), path);
   JsonFields fields(object, path);
   if (const std::string schema = fields.text("schema"); schema != kPlanSchema)
-    fail_plan(path, fmt::format("schema {}, found {}", kPlanSchema, shown(schema)));
+    fail_plan(path, fmt::format("schema {}, found {}", kPlanSchema, excerpt(schema)));
   const std::string kind = fields.text("kind");
   if (kind != "episodes" && kind != "trainings")
-    fail_plan(path, fmt::format("kind 'episodes' or 'trainings', found '{}'", shown(kind)));
+    fail_plan(path, fmt::format("kind 'episodes' or 'trainings', found '{}'", excerpt(kind)));
   ShardPlan plan;
   plan.kind = kind == "episodes" ? Kind::kEpisodes : Kind::kTrainings;
   plan.program = read_program(fields, path);

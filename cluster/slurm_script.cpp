@@ -30,7 +30,7 @@ std::string sbatch_word(const char* option, const std::string& value) {
   const bool has_double = value.find('"') != std::string::npos, has_single = value.find('\'') != std::string::npos;
   require(value.find('\\') == std::string::npos && !(has_double && has_single),
           "{}: expected a text without a backslash and with one kind of quotes at most, found '{}'", option,
-          shown(value));
+          excerpt(value));
   return has_double ? fmt::format("'{}'", value) : fmt::format("\"{}\"", value);
 }
 
@@ -136,7 +136,7 @@ std::string said_by(const std::string& command) {
       said.append(buffer.data(), n);
   }
   while (!said.empty() && said.back() == '\n') said.pop_back();
-  if (status != 0) throw InputError(fmt::format("sbatch refuses the job: {}", shown(said, kShownSentence)));
+  if (status != 0) throw InputError(fmt::format("sbatch refuses the job: {}", excerpt(said, kShownSentence)));
   return said;
 }
 
@@ -144,7 +144,7 @@ std::string said_by(const std::string& command) {
 std::string job_id(const std::string& said) {
   const std::string id = said.substr(0, said.find(';'));
   if (id.empty() || id.find_first_not_of("0123456789") != std::string::npos)
-    throw InputError(fmt::format("sbatch: expected the number of a job, found '{}'", shown(said)));
+    throw InputError(fmt::format("sbatch: expected the number of a job, found '{}'", excerpt(said)));
   return id;
 }
 
@@ -172,8 +172,8 @@ SlurmJobs slurm_jobs(const RunStatus& status, const std::string& run, const Slur
 
 void write_slurm_scripts(const SlurmJobs& jobs, const std::string& run) {
   FileBatch batch;
-  batch.write(inside(run, "slurm/array.sh"), jobs.array_script);
-  batch.write(inside(run, "slurm/merge.sh"), jobs.merge_script);
+  batch.write(join_without_links(run, "slurm/array.sh"), jobs.array_script);
+  batch.write(join_without_links(run, "slurm/merge.sh"), jobs.merge_script);
   batch.put_in_place();
 }
 

@@ -112,7 +112,7 @@ std::string poison_of(const std::string& key, const ShardHistory& history) {
 
 class ShardWorker {
  public:
-  ShardWorker(const std::string& path, std::int64_t number, const WorkOptions& options, const StopSign& stop)
+  ShardWorker(const std::string& path, std::int64_t number, const WorkOptions& options, const StopToken& stop)
       : run_(path, options.allow_programs),
         number_(number),
         shard_(shard_of(run_.plan(), number)),
@@ -122,7 +122,8 @@ class ShardWorker {
       throw InputError(
           fmt::format("{}/plan.json: shard {}: the keys of its episodes are not those of the plan", path, number));
     history_ = history_of(run_, number, rows_);
-    if (run_.experiment().suite().record != RecordTrajectories::kNone) trajectories_ = inside(path, "trajectories");
+    if (run_.experiment().suite().record != RecordTrajectories::kNone)
+      trajectories_ = join_without_links(path, "trajectories");
   }
 
   WorkSummary work(Progress& progress) {
@@ -226,7 +227,7 @@ class ShardWorker {
   std::int64_t number_;
   Shard shard_;
   WorkOptions options_;
-  const StopSign& stop_;
+  const StopToken& stop_;
   ShardRows rows_{run_, number_};
   ShardHistory history_;
   std::set<std::string> new_;  // keys of rows that were made since this worker began, by anybody
@@ -237,7 +238,7 @@ class ShardWorker {
 
 }  // namespace
 
-WorkSummary work_shard(const std::string& run, std::int64_t shard, const WorkOptions& options, const StopSign& stop,
+WorkSummary work_shard(const std::string& run, std::int64_t shard, const WorkOptions& options, const StopToken& stop,
                        Progress& progress) {
   const ShardPlan plan = read_shard_plan(run);
   static_cast<void>(shard_of(plan, shard));
@@ -275,7 +276,7 @@ void read_arms(const YamlSection& top, TrainingList& list) {
     const std::string name = arm.first.Scalar();
     if (!is_arm_name(name))
       top.fail(top.line("arms"),
-               fmt::format("arms: expected names of letters, digits, '_' and '.', found '{}'", shown(name)));
+               fmt::format("arms: expected names of letters, digits, '_' and '.', found '{}'", excerpt(name)));
     const std::string what = fmt::format("arm '{}'", name);
     std::vector<std::string> words = common;
     for (std::string& word : texts_of(arm.second, top, what)) words.push_back(std::move(word));
@@ -292,14 +293,15 @@ void read_seeds(const YamlSection& top, TrainingList& list) {
     std::uint64_t seed = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
     if (error != std::errc() || end != text.data() + text.size())
-      top.fail(top.line("seeds"), fmt::format("seeds: expected whole numbers of at least 0, found '{}'", shown(text)));
+      top.fail(top.line("seeds"),
+               fmt::format("seeds: expected whole numbers of at least 0, found '{}'", excerpt(text)));
     list.seeds.push_back(seed);
   }
   if (list.seeds.empty()) top.fail(top.line("seeds"), "seeds: expected one at least, found none");
 }
 
 // The number that a child ended with, as a shell says it.
-int wait_for(pid_t child, const StopSign& stop) {
+int wait_for(pid_t child, const StopToken& stop) {
   bool told = false;
   for (int status = 0;;) {
     const pid_t ended = ::waitpid(child, &status, WNOHANG);
@@ -340,7 +342,7 @@ TrainingList parse_trainings(const std::string& yaml, const std::string& file) {
   const YamlSection top(file, parse_yaml(yaml, file), "trainings",
                         {"schema", "train", "arguments", "arms", "seeds", "minutes"});
   if (const std::string schema = top.text("schema"); schema != kTrainingsSchema)
-    top.fail(top.line("schema"), fmt::format("expected schema {}, found {}", kTrainingsSchema, shown(schema)));
+    top.fail(top.line("schema"), fmt::format("expected schema {}, found {}", kTrainingsSchema, excerpt(schema)));
   TrainingList list;
   list.train = top.text("train");
   const std::vector<std::string> known = training_names();
@@ -401,11 +403,11 @@ std::vector<NamedProgram> programs_of(const ShardPlan& plan, const std::string& 
 }
 
 WorkSummary work_training(const std::string& run, const ShardPlan& plan, std::int64_t shard, bool allow_programs,
-                          const StopSign& stop) {
+                          const StopToken& stop) {
   const Shard& job = shard_of(plan, shard);
   require_allowed({program_of(job.training, run)}, allow_programs);
   require_same_program(plan.program, program_digests({}), run);
-  static_cast<void>(inside(run, "trainings/" + job.name));
+  static_cast<void>(join_without_links(run, "trainings/" + job.name));
   WorkSummary summary;
   summary.planned = 1;
   for (const AttemptRecord& attempt : read_attempts(run, shard))
@@ -413,9 +415,9 @@ WorkSummary work_training(const std::string& run, const ShardPlan& plan, std::in
   if (summary.already_there > 0) return summary;
   AttemptWriter attempt(run, new_attempt(shard, shard_plan_digest(run)));
   attempt.began(job.name);
-  const auto begin = StopSign::Clock::now();
+  const auto begin = StopToken::Clock::now();
   summary.exit_code = wait_for(start_child(run, command_of(job.training)), stop);
-  const double seconds = std::chrono::duration<double>(StopSign::Clock::now() - begin).count();
+  const double seconds = std::chrono::duration<double>(StopToken::Clock::now() - begin).count();
   const std::string how = ending_of(summary.exit_code);
   if (how != "stopped") attempt.did(job.name, how == "complete" ? "ok" : "error", seconds);
   if (how == "stopped") summary.end = summary.exit_code == 130 ? RunEnd::kInterrupted : RunEnd::kTerminated;

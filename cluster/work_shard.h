@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "duet/cluster/shard_plan.h"
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "duet/experiment/work/run_work.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 
 namespace duet {
 
@@ -41,7 +41,7 @@ struct WorkOptions {
 
 // Throws InputError and MissingError as PlannedRun, StorageError for a disk that takes no row (nothing is lost, no
 // episode fails by it), std::invalid_argument for a shard that the plan does not have.
-WorkSummary work_shard(const std::string& run, std::int64_t shard, const WorkOptions& options, const StopSign& stop,
+WorkSummary work_shard(const std::string& run, std::int64_t shard, const WorkOptions& options, const StopToken& stop,
                        Progress& progress);
 
 // Trainings as shards of a plan: each seed of each arm is a `duet train` of its own, in a folder of its own below
@@ -62,13 +62,13 @@ TrainingList parse_trainings(const std::string& yaml, const std::string& file);
 // InputError for a folder that is planned already or is not empty.
 ShardPlan plan_trainings(const TrainingList& list, const std::string& directory);
 
-// The programs that its shards start, for require_allowed (experiment/plan/bodies.h): one that is complete, too.
+// The programs that its shards start, for require_allowed (experiment/plan/embodiments.h): one that is complete, too.
 std::vector<NamedProgram> programs_of(const ShardPlan& plan, const std::string& run);
 
 // Runs the shard's training in this process's place, as a child that gets its signals, unless it is complete. The
 // child goes on from its last checkpoint. Throws InputError for another program than was planned with, and for a
 // training that is not allowed.
 WorkSummary work_training(const std::string& run, const ShardPlan& plan, std::int64_t shard, bool allow_programs,
-                          const StopSign& stop);
+                          const StopToken& stop);
 
 }  // namespace duet

@@ -65,7 +65,7 @@ std::string robot_of(const std::string& given, const std::string& file) {
   return (std::filesystem::path(file).parent_path() / given).lexically_normal().string();
 }
 
-FieldWords around_words() { return {.name = "around", .choices = {"default", "reference"}}; }
+FieldDoc around_words() { return {.name = "around", .choices = {"default", "reference"}}; }
 
 const Schema<DescriptorJoint>& joint_schema() {
   using J = DescriptorJoint;

@@ -115,13 +115,13 @@ class FactComparison {
           "in "
           "the network's",
           descriptor_.file, descriptor_.name, place + 1, joints[place]->name, entry->key, path_,
-          shown(entry->words[place]));
+          excerpt(entry->words[place]));
     } else {
       const auto other = std::ranges::find_if(
           names_, [&](const std::string& name) { return std::ranges::find(own, name) == own.end(); });
       const auto at = static_cast<std::size_t>(other == names_.end() ? 0 : other - names_.begin());
       say(fmt::format("'{}' of {} names {} joints, '{}' among them; the descriptor has {} others", entry->key, path_,
-                      names_.size(), shown(entry->words[at]), own.size()));
+                      names_.size(), excerpt(entry->words[at]), own.size()));
       names_.clear();
       names_differ_ = true;
     }

@@ -51,14 +51,14 @@ std::string values_of_whole(const FieldRange& range, double least, double most) 
   return fmt::format("a whole number, {:.0f} to {:.0f}", whole.low, whole.high);
 }
 
-std::string assign_value(const FieldWords& words, const std::string& text, const FieldRange& range, double& out) {
+std::string assign_value(const FieldDoc& words, const std::string& text, const FieldRange& range, double& out) {
   const std::optional<double> value = number_of(text);
   if (!value || !is_in(range, *value)) return values_of_number(range, words.unit);
   out = *value;
   return "";
 }
 
-std::string assign_value(const FieldWords& words, const std::string& text, const FieldRange&, bool& out) {
+std::string assign_value(const FieldDoc& words, const std::string& text, const FieldRange&, bool& out) {
   const std::string word = lowered(text);
   const auto is = [&](std::initializer_list<const char*> known) {
     return std::any_of(known.begin(), known.end(), [&](const char* name) { return word == name; });
@@ -70,7 +70,7 @@ std::string assign_value(const FieldWords& words, const std::string& text, const
   return "";
 }
 
-std::string assign_value(const FieldWords&, const std::string& text, const FieldRange&, std::string& out) {
+std::string assign_value(const FieldDoc&, const std::string& text, const FieldRange&, std::string& out) {
   out = text;
   return "";
 }
@@ -83,23 +83,23 @@ std::string assign_whole(const std::string& text, const FieldRange& range, doubl
   return "";
 }
 
-std::string assign_choice(const FieldWords& words, const std::string& text, std::size_t& out) {
+std::string assign_choice(const FieldDoc& words, const std::string& text, std::size_t& out) {
   const auto found = std::find(words.choices.begin(), words.choices.end(), text);
   if (found == words.choices.end()) return fmt::format("{}", fmt::join(words.choices, ", "));
   out = static_cast<std::size_t>(found - words.choices.begin());
   return "";
 }
 
-std::string value_text(const FieldWords&, double value) { return fmt::format("{}", value); }
-std::string value_text(const FieldWords& words, bool value) { return words.choices.at(value ? 1 : 0); }
-std::string value_text(const FieldWords&, const std::string& value) { return value; }
+std::string value_text(const FieldDoc&, double value) { return fmt::format("{}", value); }
+std::string value_text(const FieldDoc& words, bool value) { return words.choices.at(value ? 1 : 0); }
+std::string value_text(const FieldDoc&, const std::string& value) { return value; }
 std::string whole_text(std::int64_t value) { return fmt::format("{}", value); }
 
-std::string field_refusal(const FieldWords& words, const std::string& expected, const std::string& text) {
+std::string field_refusal(const FieldDoc& words, const std::string& expected, const std::string& text) {
   if (words.choices.size() > 2 || (!words.choices.empty() && words.choices[1] != "true"))
     return unknown_name_message(words.name, text, words.choices);
   return fmt::format("{}: expected {}, found {}", words.name, expected,
-                     number_of(text) ? text : fmt::format("'{}'", shown(text)));
+                     number_of(text) ? text : fmt::format("'{}'", excerpt(text)));
 }
 
 }  // namespace duet

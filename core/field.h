@@ -27,7 +27,7 @@ struct FieldRange {
 
 // The name and the meaning of a field. `choices` are the texts of an enumeration in the order of its enumerators from
 // 0, or of a flag: off, then on.
-struct FieldWords {
+struct FieldDoc {
   std::string name = {};
   std::string meaning = {};  // part of a sentence
   std::string unit = {};     // "" where it has none
@@ -38,7 +38,7 @@ struct FieldWords {
 // A field of an Owner. `text` gives its value as reading takes it ("" for an empty text or optional); two values with
 // one text are one value. `assign` gives what was expected where the text is no value of it, and "" where it is.
 template <typename Owner>
-struct Field : FieldWords {
+struct Field : FieldDoc {
   std::string values = {};  // what it may be, for a sentence
   std::function<std::string(const Owner&)> text = {};
   std::function<std::string(Owner&, const std::string&, const FieldRange&)> assign = {};
@@ -55,14 +55,14 @@ struct FieldRow {
 
 // The text forms. `assign_value` gives what was expected, "" where `out` was set. Numbers in the C locale, a sign
 // allowed; whole ones at most 9e15 in size; flags as in `choices`, or true, false, on, off, yes, no.
-std::string assign_value(const FieldWords& words, const std::string& text, const FieldRange& range, double& out);
-std::string assign_value(const FieldWords& words, const std::string& text, const FieldRange& range, bool& out);
-std::string assign_value(const FieldWords& words, const std::string& text, const FieldRange& range, std::string& out);
+std::string assign_value(const FieldDoc& words, const std::string& text, const FieldRange& range, double& out);
+std::string assign_value(const FieldDoc& words, const std::string& text, const FieldRange& range, bool& out);
+std::string assign_value(const FieldDoc& words, const std::string& text, const FieldRange& range, std::string& out);
 std::string assign_whole(const std::string& text, const FieldRange& range, double least, double most, double& out);
-std::string assign_choice(const FieldWords& words, const std::string& text, std::size_t& out);
-std::string value_text(const FieldWords& words, double value);
-std::string value_text(const FieldWords& words, bool value);
-std::string value_text(const FieldWords& words, const std::string& value);
+std::string assign_choice(const FieldDoc& words, const std::string& text, std::size_t& out);
+std::string value_text(const FieldDoc& words, double value);
+std::string value_text(const FieldDoc& words, bool value);
+std::string value_text(const FieldDoc& words, const std::string& value);
 std::string whole_text(std::int64_t value);
 
 // "a number above 0, at most 5 m", "a whole number, 1 to 90", "left, right", "off, on", "a text".
@@ -70,7 +70,7 @@ std::string values_of_number(const FieldRange& range, const std::string& unit);
 std::string values_of_whole(const FieldRange& range, double least, double most);
 
 // "KEY: expected WHAT, found TEXT"; of a choice the sentence that asks "did you mean".
-std::string field_refusal(const FieldWords& words, const std::string& expected, const std::string& text);
+std::string field_refusal(const FieldDoc& words, const std::string& expected, const std::string& text);
 
 template <typename T>
 struct OptionalValue : std::false_type {
@@ -82,7 +82,7 @@ struct OptionalValue<std::optional<T>> : std::true_type {
 };
 
 template <typename T>
-std::string assign_field(const FieldWords& words, const std::string& text, const FieldRange& range, T& out) {
+std::string assign_field(const FieldDoc& words, const std::string& text, const FieldRange& range, T& out) {
   if constexpr (OptionalValue<T>::value) {
     typename OptionalValue<T>::Value value{};
     std::string expected = assign_field(words, text, range, value);
@@ -105,7 +105,7 @@ std::string assign_field(const FieldWords& words, const std::string& text, const
 }
 
 template <typename T>
-std::string field_text(const FieldWords& words, const T& value) {
+std::string field_text(const FieldDoc& words, const T& value) {
   if constexpr (OptionalValue<T>::value) {
     return value ? field_text(words, *value) : std::string();
   } else if constexpr (std::is_enum_v<T>) {
@@ -119,7 +119,7 @@ std::string field_text(const FieldWords& words, const T& value) {
 
 // The values that `duet list` says are allowed.
 template <typename T>
-std::string field_values(const FieldWords& words, const FieldRange& range) {
+std::string field_values(const FieldDoc& words, const FieldRange& range) {
   if constexpr (OptionalValue<T>::value) {
     return field_values<typename OptionalValue<T>::Value>(words, range);
   } else if constexpr (std::is_same_v<T, double>) {
@@ -137,14 +137,14 @@ std::string field_values(const FieldWords& words, const FieldRange& range) {
 // The field that `member` gives of an Owner: a pointer to a member, or a function of an owner (const and not) that
 // returns a reference. Numbers, whole numbers, flags, texts, enumerations, and optional ones of these.
 template <typename Owner, typename Member>
-Field<Owner> field(FieldWords words, Member member) {
+Field<Owner> field(FieldDoc words, Member member) {
   using Value = std::remove_cvref_t<std::invoke_result_t<Member, Owner&>>;
   if constexpr (std::is_same_v<Value, bool>)
     if (words.choices.empty()) words.choices = {"false", "true"};
   Field<Owner> made;
-  static_cast<FieldWords&>(made) = std::move(words);
+  static_cast<FieldDoc&>(made) = std::move(words);
   made.values = field_values<Value>(made, made.range);
-  const FieldWords said = made;
+  const FieldDoc said = made;
   made.text = [said, member](const Owner& owner) { return field_text(said, std::invoke(member, owner)); };
   made.assign = [said, member](Owner& owner, const std::string& text, const FieldRange& range) {
     return assign_field(said, text, range, std::invoke(member, owner));
@@ -154,7 +154,7 @@ Field<Owner> field(FieldWords words, Member member) {
 
 // The same of a number that may not be below another field before it: a default that is below rises to it.
 template <typename Owner, typename Member>
-Field<Owner> field(FieldWords words, Member member, double Owner::*least) {
+Field<Owner> field(FieldDoc words, Member member, double Owner::*least) {
   Field<Owner> made = field<Owner>(std::move(words), member);
   made.least = [least](const Owner& owner) { return owner.*least; };
   return made;
@@ -163,10 +163,10 @@ Field<Owner> field(FieldWords words, Member member, double Owner::*least) {
 // A field of a type of its own: what it may be, its text, and what sets it from one (what was expected, "" where it is
 // set).
 template <typename Owner>
-Field<Owner> field(FieldWords words, const std::string& values, std::function<std::string(const Owner&)> text,
+Field<Owner> field(FieldDoc words, const std::string& values, std::function<std::string(const Owner&)> text,
                    const std::function<std::string(Owner&, const std::string&)>& assign) {
   Field<Owner> made;
-  static_cast<FieldWords&>(made) = std::move(words);
+  static_cast<FieldDoc&>(made) = std::move(words);
   made.values = values;
   made.text = std::move(text);
   made.assign = [assign](Owner& owner, const std::string& said, const FieldRange&) { return assign(owner, said); };

@@ -183,7 +183,7 @@ void write_file(const std::string& path, std::string_view bytes, Durability dura
   replace_file(std::filesystem::canonical(path).string(), bytes, status.st_mode & 07777, durability);
 }
 
-std::string inside(const std::string& folder, const std::string& name) {
+std::string join_without_links(const std::string& folder, const std::string& name) {
   namespace fs = std::filesystem;
   fs::path path = folder;
   for (const fs::path& part : fs::path(name)) {
@@ -357,7 +357,7 @@ std::string no_data_fault(std::string_view first_bytes) {
 void refuse_no_data(const std::string& path, std::string_view first_bytes) {
   const std::string fault = no_data_fault(first_bytes);
   if (fault.empty() || (fault == kPage && (path.ends_with(".html") || path.ends_with(".htm")))) return;
-  throw InputError("'" + shown(path, kShownSentence) + "': " + fault);
+  throw InputError("'" + excerpt(path, kShownSentence) + "': " + fault);
 }
 
 std::string_view without_byte_order_mark(std::string_view text) {
@@ -386,7 +386,7 @@ ReadObserver& read_observer() {
 namespace {
 
 void refuse_empty(const std::string& path, const std::string& bytes) {
-  if (bytes.empty()) throw InputError(fmt::format("'{}': the file is empty", shown(path, kShownSentence)));
+  if (bytes.empty()) throw InputError(fmt::format("'{}': the file is empty", excerpt(path, kShownSentence)));
 }
 
 }  // namespace
@@ -403,7 +403,7 @@ std::string read_head(const std::string& path, std::size_t most) {
   std::ifstream file(path, std::ios::binary);
   if (!file)
     throw InputError(
-        fmt::format("cannot read '{}': {}", shown(path, kShownSentence), std::generic_category().message(errno)));
+        fmt::format("cannot read '{}': {}", excerpt(path, kShownSentence), std::generic_category().message(errno)));
   std::string bytes(most, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(most));
   bytes.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
@@ -418,7 +418,7 @@ void require_data(const std::string& path) {
   refuse_no_data(path, head);
 }
 
-std::string naming_file_message(const std::string& path, const std::string& message) {
+std::string file_context_message(const std::string& path, const std::string& message) {
   return message.find(path) == std::string::npos ? path + ": " + message : message;
 }
 

@@ -41,7 +41,7 @@ void write_file(const std::string& path, std::string_view bytes, Durability dura
 // The path of `name` ("episodes.jsonl", "trajectories/a.npz") in a folder that may have come from others. Throws
 // StorageError where `name`, or a folder on the way to it below `folder`, is a symbolic link: what is written into
 // `folder` stays there.
-std::string inside(const std::string& folder, const std::string& name);
+std::string join_without_links(const std::string& folder, const std::string& name);
 
 // Appends lines to one file; each is complete on disk (written and synced) when append() returns. A last line without
 // its newline (a killed run) is cut off when the file is opened: where several processes write to it, under a lock that
@@ -121,22 +121,22 @@ void require_data(const std::string& path);
 // Names the file in errors that are found only after it was read. Thread-safe.
 
 // "FILE: MESSAGE", or the message alone where it names the file already.
-std::string naming_file_message(const std::string& path, const std::string& message);
+std::string file_context_message(const std::string& path, const std::string& message);
 
 // The result of `work`. Its InputError, std::invalid_argument and std::bad_alloc become an InputError that names the
 // file.
 template <typename Work>
-decltype(auto) naming_file(const std::string& path, Work&& work) {
+decltype(auto) with_file_context(const std::string& path, Work&& work) {
   try {
     return std::forward<Work>(work)();
   } catch (const StorageError&) {
     throw;  // the disk's fault, not the file's
   } catch (const InputError& error) {
-    throw InputError(naming_file_message(path, error.what()));
+    throw InputError(file_context_message(path, error.what()));
   } catch (const std::invalid_argument& error) {
-    throw InputError(naming_file_message(path, error.what()));
+    throw InputError(file_context_message(path, error.what()));
   } catch (const std::bad_alloc&) {
-    throw InputError(naming_file_message(path, "there is not enough memory for it"));
+    throw InputError(file_context_message(path, "there is not enough memory for it"));
   }
 }
 

@@ -18,7 +18,7 @@ constexpr std::size_t kShownReason = 200;
 std::string reason(const nlohmann::json::exception& error) {
   const std::string_view sentence = error.what();
   const std::size_t begin = sentence.starts_with('[') ? sentence.find("] ") : std::string_view::npos;
-  return shown(begin == std::string_view::npos ? sentence : sentence.substr(begin + 2), kShownReason);
+  return excerpt(begin == std::string_view::npos ? sentence : sentence.substr(begin + 2), kShownReason);
 }
 
 using Event = nlohmann::json::parse_event_t;
@@ -57,8 +57,8 @@ nlohmann::json parse_json(std::string_view text, const std::string& what) {
   try {
     nlohmann::json json = nlohmann::json::parse(text, check);
     if (has_twice)
-      throw InputError(
-          fmt::format("{}: expected each key of an object once, found '{}' twice", what, shown(key_given_twice(text))));
+      throw InputError(fmt::format("{}: expected each key of an object once, found '{}' twice", what,
+                                   excerpt(key_given_twice(text))));
     return json;
   } catch (const nlohmann::json::exception& error) {
     throw InputError(fmt::format("{}: not valid JSON: {}", what, reason(error)));

@@ -83,7 +83,7 @@ std::string unknown_name_message(std::string_view kind, std::string_view name,
                                  std::span<const std::string> candidates) {
   const std::string closest = closest_name(name, candidates);
   const std::string question = closest.empty() ? "." : fmt::format(": did you mean '{}'?", closest);
-  return fmt::format("unknown {} '{}'{} {}", kind, shown(name), question, known_names(name, candidates));
+  return fmt::format("unknown {} '{}'{} {}", kind, excerpt(name), question, known_names(name, candidates));
 }
 
 std::string option_or(const std::map<std::string, std::string>& options, const std::string& name,

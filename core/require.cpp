@@ -45,7 +45,7 @@ std::optional<CodePoint> code_point_at(std::string_view text, std::size_t at) {
   return CodePoint{code, length};
 }
 
-std::string shown(std::string_view text, std::size_t most) {
+std::string excerpt(std::string_view text, std::size_t most) {
   std::string result;
   std::size_t kept = 0;  // bytes of `result` that leave room for the dots
   for (std::size_t at = 0; at < text.size();) {

@@ -60,7 +60,7 @@ inline constexpr std::size_t kShownSentence = 2000;  // a sentence that lists th
 
 // `text`, where longer cut to `most` bytes with "..." last. Escapes all that could move a terminal's cursor, recolour
 // it or turn its text around: "\x1b" for a control character or a byte that is not UTF-8, "\n", "\t", "\u202e".
-std::string shown(std::string_view text, std::size_t most = kShown);
+std::string excerpt(std::string_view text, std::size_t most = kShown);
 
 // The same for a text of any length, such as a table: line ends and tabs stay.
 std::string printable(std::string_view text);
@@ -71,7 +71,7 @@ std::string printable(std::string_view text);
 inline constexpr std::size_t kShownName = 400;  // [bytes]; the longest name of one file has 255
 
 // `text`, where a word, or a name in quotes that has spaces, of more than `most` bytes keeps its beginning and its end.
-// For whole messages, at the place where they are written; shown() cuts one text that stands in a message.
+// For whole messages, at the place where they are written; excerpt() cuts one text that stands in a message.
 std::string with_short_names(std::string_view text, std::size_t most = kShownName);
 
 // The parts of a line of text. The returned parts point into `text`.

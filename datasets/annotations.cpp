@@ -23,7 +23,7 @@ std::optional<double> seconds(const CsvReader& line, std::string_view name, cons
   if (text.empty()) return std::nullopt;
   const std::optional<double> value = line.number(text);
   if (!value || *value < 0.0)
-    line.fail(fmt::format("{}: expected seconds from the clip's beginning, found '{}'", name, shown(text)));
+    line.fail(fmt::format("{}: expected seconds from the clip's beginning, found '{}'", name, excerpt(text)));
   return value;
 }
 
@@ -38,7 +38,7 @@ std::optional<Task> task_of(const CsvReader& line, const std::string& text) {
 
 std::optional<Person> reactor_of(const CsvReader& line, const std::string& text) {
   if (text.empty()) return std::nullopt;
-  if (text != "A" && text != "B") line.fail(fmt::format("reactor: expected A or B, found '{}'", shown(text)));
+  if (text != "A" && text != "B") line.fail(fmt::format("reactor: expected A or B, found '{}'", excerpt(text)));
   return text == "A" ? Person::kA : Person::kB;
 }
 
@@ -72,7 +72,7 @@ Annotations parse_annotations(std::string_view text, const std::string& name) {
     Annotation annotation = annotation_in(rows);
     const std::string clip = annotation.clip;
     if (!annotations.emplace(clip, std::move(annotation)).second)
-      rows.fail(fmt::format("clip '{}' is there twice", shown(clip)));
+      rows.fail(fmt::format("clip '{}' is there twice", excerpt(clip)));
   }
   return annotations;
 }

@@ -267,11 +267,11 @@ void set_limit(CurationOptions& options, const std::string& name, const std::str
   options.limits[name] = *limit;
 }
 
-bool CurationVerdict::passed() const {
+bool CurationResult::passed() const {
   return std::ranges::all_of(findings, [](const CriterionFinding& finding) { return finding.passed; });
 }
 
-std::vector<Gate> CurationVerdict::refused_by() const {
+std::vector<Gate> CurationResult::refused_by() const {
   std::vector<Gate> gates;
   for (const CriterionFinding& finding : findings)
     if (!finding.passed && std::ranges::count(gates, finding.criterion->gate) == 0)
@@ -279,7 +279,7 @@ std::vector<Gate> CurationVerdict::refused_by() const {
   return gates;
 }
 
-std::vector<std::string> CurationVerdict::reasons() const {
+std::vector<std::string> CurationResult::reasons() const {
   std::vector<std::string> sentences;
   for (const CriterionFinding& finding : findings)
     if (!finding.passed)
@@ -290,7 +290,7 @@ std::vector<std::string> CurationVerdict::reasons() const {
   return sentences;
 }
 
-int CurationVerdict::worst_frame() const {
+int CurationResult::worst_frame() const {
   const CriterionFinding* worst = nullptr;
   for (const CriterionFinding& finding : findings)
     if (!finding.passed && (worst == nullptr || excess(finding) > excess(*worst))) worst = &finding;
@@ -299,8 +299,8 @@ int CurationVerdict::worst_frame() const {
 
 double limb_bone_change(const InteractionClip& clip) { return bone_change(clip).value; }
 
-CurationVerdict curate(const InteractionClip& clip, const CurationOptions& options) {
-  CurationVerdict verdict;
+CurationResult curate(const InteractionClip& clip, const CurationOptions& options) {
+  CurationResult verdict;
   for (const Criterion& criterion : kCriteria)
     if (std::ranges::count(options.gates, criterion.info.gate) > 0)
       verdict.findings.push_back(find(criterion, clip, options));

@@ -46,7 +46,7 @@ struct CriterionFinding {
   bool passed = true;
 };
 
-struct CurationVerdict {
+struct CurationResult {
   std::vector<CriterionFinding> findings;  // of the gates asked for, in the table's order
 
   [[nodiscard]] bool passed() const;
@@ -61,7 +61,7 @@ struct CurationVerdict {
 // The figure of the criterion "bone_change".
 double limb_bone_change(const InteractionClip& clip);
 
-CurationVerdict curate(const InteractionClip& clip, const CurationOptions& options = {});
+CurationResult curate(const InteractionClip& clip, const CurationOptions& options = {});
 
 // Two people as stick figures: what a person looks at to see why a clip was refused.
 

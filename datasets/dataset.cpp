@@ -166,7 +166,7 @@ class ClipWork {
     entry.format = format_.name;
     entry.licence = format_.licence;
     try {
-      naming_file(place_.files.front(), [&] { make(entry); });
+      with_file_context(place_.files.front(), [&] { make(entry); });
     } catch (const StorageError&) {
       throw;
     } catch (const InputError& error) {
@@ -204,7 +204,7 @@ class ClipWork {
     inputs_.strip(clip.source);
     describe(entry, clip);
     clock_.stage("curate");
-    const CurationVerdict verdict = judge(entry, clip);
+    const CurationResult verdict = judge(entry, clip);
     if (!verdict.passed()) {
       clock_.stage("write");
       keep(entry, rejected_file(place_.id),
@@ -239,10 +239,10 @@ class ClipWork {
     entry.statistics = clip_statistics(clip);
   }
 
-  CurationVerdict judge(DatasetEntry& entry, const InteractionClip& clip) const {
+  CurationResult judge(DatasetEntry& entry, const InteractionClip& clip) const {
     CurationOptions options = plan_.curation;
     options.source_bone_change = source_.bone_change;
-    CurationVerdict verdict = curate(clip, options);
+    CurationResult verdict = curate(clip, options);
     for (const CriterionFinding& finding : verdict.findings)
       entry.criteria[std::string(finding.criterion->name)] = finding.value;
     entry.status = verdict.passed() ? ClipStatus::kKept : ClipStatus::kRejected;
@@ -268,7 +268,7 @@ class ClipWork {
   }
 
   void keep(DatasetEntry& entry, const std::string& file, const std::string& bytes) const {
-    write_file(inside(folder_, file), bytes, Durability::kUnsynced);
+    write_file(join_without_links(folder_, file), bytes, Durability::kUnsynced);
     entry.outputs.push_back({.file = file, .sha256 = sha256_hex(bytes)});
   }
 

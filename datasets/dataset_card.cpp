@@ -358,7 +358,9 @@ std::string rejected_file(const std::string& clip) { return "rejected/" + clip +
 void write_derived_files(const std::string& folder, const std::vector<DatasetEntry>& entries) {
   const nlohmann::json settings = read_dataset_settings(folder);
   FileBatch batch;
-  const auto write = [&](const std::string& name, const std::string& text) { batch.write(inside(folder, name), text); };
+  const auto write = [&](const std::string& name, const std::string& text) {
+    batch.write(join_without_links(folder, name), text);
+  };
   write("manifest.json", manifest_of(entries));
   write("annotations.csv", annotations_of(entries));
   write("tables/curation.csv", csv_table(curation_table(entries)));

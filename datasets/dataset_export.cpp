@@ -75,7 +75,7 @@ class Export {
     std::error_code error;
     fs::create_directories(output, error);
     if (error) throw StorageError(fmt::format("cannot create '{}': {}", output, error.message()));
-    log_ = std::make_unique<LineAppender>(inside(output, kLog));
+    log_ = std::make_unique<LineAppender>(join_without_links(output, kLog));
     read_log();
   }
 
@@ -94,7 +94,7 @@ class Export {
     std::vector<NamedDigest> files;
     for (const auto& [name, content] : robot_motion_files(paired.robot, *item.robot->model, format_, writing)) {
       const std::string file = name.empty() ? stem + format_.ending : fmt::format("{}/{}", stem, name);
-      write_file(inside(output_, file), content, Durability::kUnsynced);
+      write_file(join_without_links(output_, file), content, Durability::kUnsynced);
       files.push_back({.file = file, .sha256 = sha256_hex(content)});
     }
     const json row = row_of(item, format_, writing_, files);
@@ -107,7 +107,7 @@ class Export {
   void write_manifest() const {
     json list = json::array();
     for (const auto& [name, row] : rows_) list.push_back(row);
-    write_file(inside(output_, "manifest.json"), dumped(list, 1) + "\n");
+    write_file(join_without_links(output_, "manifest.json"), dumped(list, 1) + "\n");
   }
 
  private:
@@ -136,7 +136,7 @@ class Export {
     for (const json& file : row["files"]) files.push_back({.file = file["file"], .sha256 = file["sha256"]});
     if (row != row_of(item, format_, writing_, files)) return false;
     return std::ranges::all_of(files, [&](const NamedDigest& file) {
-      const std::string path = inside(output_, file.file);
+      const std::string path = join_without_links(output_, file.file);
       return fs::exists(path) && sha256_file(path) == file.sha256;
     });
   }

@@ -201,14 +201,14 @@ std::string difference(const nlohmann::json& there, const nlohmann::json& asked)
   for (const auto& [key, value] : asked.items())
     if (!there.contains(key) || there[key] != value)
       return fmt::format("'{}' is {} there and {} now", key,
-                         there.contains(key) ? shown(dumped(there[key])) : "not known", shown(dumped(value)));
+                         there.contains(key) ? excerpt(dumped(there[key])) : "not known", excerpt(dumped(value)));
   for (const auto& [key, value] : there.items())
-    if (!asked.contains(key)) return fmt::format("'{}' is {} there and not known now", key, shown(dumped(value)));
+    if (!asked.contains(key)) return fmt::format("'{}' is {} there and not known now", key, excerpt(dumped(value)));
   return "";
 }
 
 void check_settings(const std::string& folder, const nlohmann::json& settings) {
-  const std::string file = inside(folder, kSettingsFile);
+  const std::string file = join_without_links(folder, kSettingsFile);
   if (fs::exists(file)) {
     const std::string differs = difference(read_dataset_settings(folder), settings);
     if (!differs.empty())
@@ -235,13 +235,13 @@ std::string created(const std::string& folder) {
 }  // namespace
 
 DatasetFolder::DatasetFolder(const std::string& path, const nlohmann::json& settings)
-    : path_(created(path)), lock_(inside(path, kLockFile)) {
+    : path_(created(path)), lock_(join_without_links(path, kLockFile)) {
   if (!lock_.try_lock(0))
     throw InputError(
         fmt::format("'{}': another process is making this data set: wait for it, or use another folder", path));
   check_settings(path_, settings);
   entries_ = entries_in(path_);
-  log_ = std::make_unique<LineAppender>(inside(path_, kEntriesFile));
+  log_ = std::make_unique<LineAppender>(join_without_links(path_, kEntriesFile));
 }
 
 std::optional<DatasetEntry> DatasetFolder::find(const std::string& clip, const std::string& key) const {
@@ -253,7 +253,7 @@ std::optional<DatasetEntry> DatasetFolder::find(const std::string& clip, const s
     found = entry->second;
   }
   const bool whole = std::ranges::all_of(found.outputs, [&](const NamedDigest& output) {
-    const std::string file = inside(path_, output.file);
+    const std::string file = join_without_links(path_, output.file);
     return fs::exists(file) && sha256_file(file) == output.sha256;
   });
   return whole ? std::optional(std::move(found)) : std::nullopt;

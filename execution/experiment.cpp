@@ -14,7 +14,7 @@
 #include "duet/core/robot_state.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/work/run_work.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/rows/groups/row_groups.h"
 #include "duet/scoring/scoring.h"
 
@@ -58,7 +58,7 @@ EpisodeRow ended_row(EpisodeRow row, Outcome outcome, const std::string& message
   return row;
 }
 
-ExperimentOptions only(const RunPart& chosen, const Suite& suite) {
+ExperimentOptions only(const EpisodeFilter& chosen, const Suite& suite) {
   return {.skipped_controllers = left_out(chosen.controllers, suite.controller_names()),
           .skipped_policies = left_out(chosen.policies, suite.policy_names())};
 }
@@ -202,7 +202,7 @@ void Experiment::simulate(const EpisodeSpec& spec, const EpisodeOverrides& overr
   RolloutSetup setup = this->setup(spec);
   if (overrides.stop_asked) setup.stop_asked = overrides.stop_asked;
   if (overrides.partner) *overrides.partner = episode_partner(setup).joints;
-  setup.led_partner = overrides.partner;
+  setup.driven_partner = overrides.partner;
   const Rollout rollout = overrides.world ? overrides.world(setup, *policy) : executed(spec, setup, *policy, row);
   if (rollout.interrupted) throw EpisodeInterrupted();
   if (const PolicyFaults& faults = rollout.policy_faults; faults.dead) {

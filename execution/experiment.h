@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "duet/backends/backend.h"
-#include "duet/experiment/plan/bodies.h"
 #include "duet/experiment/plan/clips.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/plan/run_identity.h"
 #include "duet/policies/catalogue/registry.h"
@@ -29,21 +29,21 @@ std::string utc_now();  // "2026-11-23T15:00:00Z"
 EpisodeRow ended_row(EpisodeRow row, Outcome outcome, const std::string& message);
 
 struct ExperimentOptions {
-  RunPart part = {};  // the episodes of the plan
+  EpisodeFilter part = {};  // the episodes of the plan
   // Those that are not loaded.
   std::vector<std::string> skipped_controllers = {}, skipped_policies = {};
   std::map<std::string, PolicyLoader> called = {};  // how policies are made that the caller brings, by name
   std::vector<std::string> led = {};                // policies that the caller is: nobody knows what they are
 };
 // Leaves out of loading what the suite has beside `chosen`.
-ExperimentOptions only(const RunPart& chosen, const Suite& suite);
+ExperimentOptions only(const EpisodeFilter& chosen, const Suite& suite);
 
 // The differences of a run of an episode from its spec.
 struct EpisodeOverrides {
   PolicyMaker policy = {};                // leads in the place of the suite's own
   std::function<bool()> stop_asked = {};  // empty: signals alone stop it
   // Filled with what the clip's partner does; the policy may then change what comes after the tick that it plans at
-  // (Episode::led_partner). Null: the partner follows the clip.
+  // (Episode::driven_partner). Null: the partner follows the clip.
   std::shared_ptr<PointTracks> partner = {};
   std::string trajectories = {};  // the folder for recordings that the suite keeps; empty: none is kept
   bool record_all = false;        // every recording is kept, whatever the suite says
@@ -61,7 +61,7 @@ class Experiment {
 
   [[nodiscard]] const Suite& suite() const { return suite_; }
   [[nodiscard]] const RunIdentity& identity() const { return identity_; }
-  [[nodiscard]] const Bodies& bodies() const { return bodies_; }
+  [[nodiscard]] const Embodiments& bodies() const { return bodies_; }
 
   // Makes the clips ready, puts them on every robot and plans. Throws as prepare_clips and EpisodePlan.
   void prepare(int threads, Progress& progress, PrepareOptions options = {});
@@ -99,8 +99,8 @@ class Experiment {
   void simulate(const EpisodeSpec& spec, const EpisodeOverrides& overrides, EpisodeRow& row) const;
 
   Suite suite_;
-  RunPart part_;
-  Bodies bodies_;
+  EpisodeFilter part_;
+  Embodiments bodies_;
   RunIdentity identity_;
   ScoringRules rules_;
   std::optional<EpisodePlan> plan_;

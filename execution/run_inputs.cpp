@@ -65,13 +65,13 @@ bool names_card_by_path(const SuiteController& controller) {
   return controller.use.ends_with(".yaml") && load_descriptor(controller.use).robot.ends_with(".yaml");
 }
 
-class Keeper {
+class InputArchive {
  public:
-  Keeper(Suite suite, const std::string& folder, FileDigests files) : folder_(folder), files_(std::move(files)) {
+  InputArchive(Suite suite, const std::string& folder, FileDigests files) : folder_(folder), files_(std::move(files)) {
     kept_.suite = std::move(suite);
   }
 
-  KeptSuite keep() {
+  ArchivedSuite keep() {
     keep_clips();
     if (!kept_.suite.contact_limits.empty())
       kept_.suite.contact_limits = copy("contact_limits", "", kept_.suite.contact_limits, "inputs/contact_limits.yaml");
@@ -146,7 +146,7 @@ class Keeper {
 
   std::string folder_;
   FileDigests files_;
-  KeptSuite kept_;
+  ArchivedSuite kept_;
 };
 
 nlohmann::json to_json(const std::vector<RunInput>& inputs) {
@@ -283,13 +283,13 @@ void find_clips(std::vector<std::string>& files, const std::vector<RunInput>& in
 [[noreturn]] void fail_place(const std::string& of, const std::string& expected, const std::string& named,
                              const std::string& folder) {
   throw InputError(
-      fmt::format("{}: {}: expected {}, found '{}'", in(folder, "suite.yaml"), of, expected, shown(named)));
+      fmt::format("{}: {}: expected {}, found '{}'", in(folder, "suite.yaml"), of, expected, excerpt(named)));
 }
 
 // A file that the run keeps is the one that suite.yaml names.
 void require_kept_place(const RunInput& input, const std::string& named, const std::string& folder) {
   if (input.kept && from_folder(named, folder) != fs::path(input.file).lexically_normal().string())
-    fail_place(input.of, fmt::format("the file '{}' that the run keeps", shown(input.file)), named, folder);
+    fail_place(input.of, fmt::format("the file '{}' that the run keeps", excerpt(input.file)), named, folder);
 }
 
 // Requires the places of what is read for tables and pages; policies and controllers are found by their digests.
@@ -348,13 +348,13 @@ Suite rebased(Suite suite, const std::string& from, const std::string& to) {
   return suite;
 }
 
-KeptSuite kept_suite(Suite suite, const std::string& folder, const FileDigests& files) {
-  return Keeper(std::move(suite), folder, files).keep();
+ArchivedSuite archive_inputs(Suite suite, const std::string& folder, const FileDigests& files) {
+  return InputArchive(std::move(suite), folder, files).keep();
 }
 
-void keep_inputs(const KeptSuite& kept, const std::string& folder) {
-  for (const KeptSuite::Copy& copy : kept.copies) {
-    const std::string to = inside(folder, copy.to);
+void keep_inputs(const ArchivedSuite& kept, const std::string& folder) {
+  for (const ArchivedSuite::Copy& copy : kept.copies) {
+    const std::string to = join_without_links(folder, copy.to);
     if (fs::exists(to)) continue;
     const std::string bytes = read_file(copy.from);
     if (sha256_hex(bytes) != copy.sha256)
@@ -362,7 +362,7 @@ void keep_inputs(const KeptSuite& kept, const std::string& folder) {
     write_file(to, bytes);
     fs::permissions(to, fs::status(copy.from).permissions() | fs::perms::owner_write);
   }
-  if (const std::string index = inside(folder, kIndex); !fs::exists(index))
+  if (const std::string index = join_without_links(folder, kIndex); !fs::exists(index))
     write_file(index, dumped(to_json(kept.inputs), 2) + "\n");
 }
 
@@ -381,7 +381,7 @@ std::string clips_fault(const Run& run, const std::vector<std::string>& clips) {
   for (const RunInput& input : read_inputs(run.path)) {
     if (input.of != kClips || i == clips.size()) continue;
     const std::string& file = clips[i++];
-    const std::string name = shown(fs::path(file).filename().string());
+    const std::string name = excerpt(fs::path(file).filename().string());
     if (!fs::exists(file)) return fmt::format("'{}' is not there", name);
     if (sha256_file(file) != input.sha256) return fmt::format("'{}' is not what the run was made from", name);
   }

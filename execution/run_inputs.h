@@ -20,7 +20,7 @@ struct RunInput {
 };
 
 // A suite whose files lie in a run directory, and how they come there.
-struct KeptSuite {
+struct ArchivedSuite {
   struct Copy {
     std::string from, to;  // to: from the run directory
     std::string sha256;    // of what is used
@@ -33,11 +33,11 @@ struct KeptSuite {
 // Plans what `folder` is to keep of a suite. Clips of more than kMostClipBytes in all stay where they are. Writes
 // nothing; throws InputError for a file that cannot be read. `files`: digests of what is loaded (RunIdentity::files).
 inline constexpr std::uintmax_t kMostClipBytes = std::uintmax_t{1} << 28;
-KeptSuite kept_suite(Suite suite, const std::string& folder, const FileDigests& files = {});
+ArchivedSuite archive_inputs(Suite suite, const std::string& folder, const FileDigests& files = {});
 
 // Copies what is not in `folder` yet and writes inputs.json, in this order. Throws InputError for a file that is
 // another one by now than the run has loaded.
-void keep_inputs(const KeptSuite& kept, const std::string& folder);
+void keep_inputs(const ArchivedSuite& kept, const std::string& folder);
 // Whether it has done so to its end.
 bool has_inputs(const std::string& folder);
 

@@ -20,8 +20,8 @@
 namespace duet {
 namespace {
 
-RunPart part_of(const RunOptions& options) {
-  RunPart part = options;
+EpisodeFilter part_of(const RunOptions& options) {
+  EpisodeFilter part = options;
   if (options.decide.asked()) part.policies = options.decide.policies;
   return part;
 }
@@ -84,7 +84,7 @@ std::string settings_here(const std::vector<std::string>& engines, const Profile
 
 }  // namespace
 
-RunInfo new_run_info(const Experiment& experiment, const KeptSuite& kept, const std::vector<std::string>& argv,
+RunInfo new_run_info(const Experiment& experiment, const ArchivedSuite& kept, const std::vector<std::string>& argv,
                      const nlohmann::json& certificate) {
   const RunIdentity& identity = experiment.identity();
   return {.suite = kept.suite.name,
@@ -103,8 +103,8 @@ RunInfo new_run_info(const Experiment& experiment, const KeptSuite& kept, const 
 namespace {
 
 // Places in the plan of those that are asked for and not in the folder yet; counts those that are.
-std::vector<std::uint32_t> missing_episodes(const Experiment& experiment, const RunPart& part, const RunDirectory& run,
-                                            const StopSign& stop, RunSummary& summary) {
+std::vector<std::uint32_t> missing_episodes(const Experiment& experiment, const EpisodeFilter& part,
+                                            const RunDirectory& run, const StopToken& stop, RunSummary& summary) {
   std::vector<std::uint32_t> missing;
   for (std::int64_t i = 0; i < experiment.size(); ++i) {
     if (i % 256 == 0 && stop.asked()) throw Stopped();
@@ -130,17 +130,17 @@ std::vector<Task> tasks_of(const std::vector<PairedMotion>& clips) {
 // Says in the folder and in the summary what was asked for.
 void ask_for(const Experiment& experiment, const std::vector<Task>& clips, const RunOptions& options, RunDirectory& run,
              RunSummary& summary) {
-  const auto count = [&](const std::vector<RunPart>& parts) {
+  const auto count = [&](const std::vector<EpisodeFilter>& parts) {
     return count_episodes(experiment.suite(), clips, parts);
   };
   summary.planned = count({part_of(options)});
-  run.ask_for(part_of(options), count({RunPart()}), count);
+  run.ask_for(part_of(options), count({EpisodeFilter()}), count);
 }
 
 // Episodes that are run into a folder.
 struct Rollouts {
   const Experiment& experiment;
-  const StopSign& stop;
+  const StopToken& stop;
   EpisodeCosts& costs;
   int threads = 1;
 
@@ -149,8 +149,8 @@ struct Rollouts {
            RunSummary& summary) const {
     const bool records = experiment.suite().record != RecordTrajectories::kNone;
     const EpisodeOverrides overrides{.stop_asked = [&] { return stop.asked(); },
-                                     .trajectories = records ? inside(folder.path(), "trajectories") : ""};
-    SharedWork work(folder, stop);
+                                     .trajectories = records ? join_without_links(folder.path(), "trajectories") : ""};
+    EpisodeDispatcher work(folder, stop);
     const auto key_at = [&](int i) { return experiment.row(places[i]).key; };
     const auto run_at = [&](int i) {
       const EpisodeSpec spec = experiment.at(places[i]);
@@ -171,7 +171,7 @@ struct Rollouts {
 // there before but the work that they save.
 void run_until_decided(const Rollouts& rollouts, const RunOptions& options, const std::vector<std::uint32_t>& missing,
                        Progress& progress, RunDirectory& run, RunSummary& summary) {
-  const RunPart part = part_of(options);
+  const EpisodeFilter part = part_of(options);
   const DecisionSchedule schedule =
       decision_schedule(rollouts.experiment.plan(), part, rollouts.experiment.suite().seed, options.episodes_per_look);
   DecidedRun decided{.decision = decide({}, schedule.rounds, {}, options.decide), .planned = summary.planned};
@@ -188,7 +188,7 @@ void run_until_decided(const Rollouts& rollouts, const RunOptions& options, cons
     decided.decision =
         decide(rows_of_part(load_run(run.path()).rows, part), schedule.rounds,
                {schedule.looks.begin(), schedule.looks.begin() + static_cast<long>(look) + 1}, options.decide);
-    write_file(inside(run.path(), "decision.json"), dumped(decided_run_json(decided), 2) + "\n");
+    write_file(join_without_links(run.path(), "decision.json"), dumped(decided_run_json(decided), 2) + "\n");
     summary.decided = decided;
   }
   progress.finish();
@@ -208,7 +208,7 @@ std::vector<std::uint32_t> pilots_first(const EpisodePlan& plan, const std::vect
 }
 
 // Runs what is missing.
-void run_missing(const Experiment& experiment, const RunOptions& options, const StopSign& stop, Progress& progress,
+void run_missing(const Experiment& experiment, const RunOptions& options, const StopToken& stop, Progress& progress,
                  RunDirectory& run, RunSummary& summary) {
   EpisodeCosts costs;
   const Rollouts rollouts{experiment, stop, costs, options.threads};
@@ -247,7 +247,7 @@ void require_names_of(const std::string& directory, const std::vector<std::strin
 void say_replaced(const std::string& directory, const std::vector<SuitePolicy>& policies,
                   const std::vector<std::string>& replaced) {
   if (replaced.empty()) return;
-  const std::string path = inside(directory, "suite.yaml");
+  const std::string path = join_without_links(directory, "suite.yaml");
   const std::string before = read_text(path);
   const Suite there = parse_suite(before, path);
   std::string text = before;
@@ -280,14 +280,14 @@ RunSummary run_suite(Suite suite, const std::string& directory, const RunOptions
   for (const std::string& note : experiment.bodies().notes()) progress.note(note);
   summary.absent_controllers = experiment.bodies().absent();
   summary.absent_policies = experiment.bodies().absent_policies();
-  const KeptSuite kept = kept_suite(experiment.suite(), directory, experiment.identity().files);
+  const ArchivedSuite kept = archive_inputs(experiment.suite(), directory, experiment.identity().files);
   const RunInfo info = new_run_info(experiment, kept, options.argv, options.certificate);
   require_names_of(directory, kept.suite.policy_names(), kept.suite.engines);
   RunDirectory run = RunDirectory::open(directory, info, options.retry_errors, options.replaced);
   say_replaced(directory, experiment.suite().policies, options.replaced);
   keep_inputs(kept, directory);
   if (!run.lock_refusal().empty()) summary.warnings.push_back(no_locks_warning(directory, run.lock_refusal()));
-  const StopSign stop(options.time_limit, options.begin, options.stop_asked);
+  const StopToken stop(options.time_limit, options.begin, options.stop_asked);
   try {
     const bool made = experiment.suite().clips.files.empty();
     if (made) ask_for(experiment, experiment.suite().tasks_of_own_clips(), options, run, summary);
@@ -309,7 +309,7 @@ TaskClip task_clip_of(const EpisodeSpec& spec) { return {std::string(to_string(s
 
 }  // namespace
 
-DecisionSchedule decision_schedule(const EpisodePlan& plan, const RunPart& part, std::uint64_t seed,
+DecisionSchedule decision_schedule(const EpisodePlan& plan, const EpisodeFilter& part, std::uint64_t seed,
                                    std::size_t episodes_per_look) {
   std::map<TaskClip, std::vector<std::uint32_t>> places;
   for (std::int64_t i = 0; i < plan.size(); ++i) {
@@ -333,7 +333,7 @@ DecisionSchedule decision_schedule(const EpisodePlan& plan, const RunPart& part,
   return schedule;
 }
 
-std::vector<EpisodeRow> rows_of_part(std::vector<EpisodeRow> rows, const RunPart& part) {
+std::vector<EpisodeRow> rows_of_part(std::vector<EpisodeRow> rows, const EpisodeFilter& part) {
   std::erase_if(rows, [&](const EpisodeRow& row) {
     const bool perturbed = row.engine == kPlaybackEngine || chosen(part.perturbations, row.perturbation);
     return !chosen(part.engines, row.engine) || !chosen(part.controllers, row.controller) ||

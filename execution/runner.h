@@ -14,7 +14,7 @@
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/experiment/work/run_work.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/report/ranking/decision.h"
 #include "duet/rows/folder/run_directory.h"
@@ -35,11 +35,11 @@ struct DecisionSchedule {
 inline constexpr std::size_t kEpisodesPerLook = 60;
 
 // Throws InputError where the part has no episode.
-DecisionSchedule decision_schedule(const EpisodePlan& plan, const RunPart& part, std::uint64_t seed,
+DecisionSchedule decision_schedule(const EpisodePlan& plan, const EpisodeFilter& part, std::uint64_t seed,
                                    std::size_t episodes_per_look = kEpisodesPerLook);
 
 // Rows of the part alone: a folder may hold other engines and perturbations as well.
-std::vector<EpisodeRow> rows_of_part(std::vector<EpisodeRow> rows, const RunPart& part);
+std::vector<EpisodeRow> rows_of_part(std::vector<EpisodeRow> rows, const EpisodeFilter& part);
 
 // Whether a look needs the episode: policies that are told apart already need none, the null arm runs beside the rest.
 bool is_needed(const EpisodeSpec& spec, const Decision& so_far);
@@ -54,11 +54,11 @@ struct DecidedRun {
 std::string decided_run_text(const DecidedRun& run);
 nlohmann::json decided_run_json(const DecidedRun& run);  // what decision.json in a run directory says
 
-// Options of a run; as a RunPart, the part of the suite that is to run.
-struct RunOptions : RunPart {
+// Options of a run; as a EpisodeFilter, the part of the suite that is to run.
+struct RunOptions : EpisodeFilter {
   int threads = 1;
-  double time_limit = 0.0;                                     // of the whole run [s]; 0 = none
-  StopSign::Clock::time_point begin = StopSign::Clock::now();  // of the command: where the time limit counts from
+  double time_limit = 0.0;                                       // of the whole run [s]; 0 = none
+  StopToken::Clock::time_point begin = StopToken::Clock::now();  // of the command: where the time limit counts from
   bool retry_errors = false;  // runs episodes again that ended with an error before, as time-outs
   std::vector<std::string> argv;
   DecisionOptions decide;  // where asked: runs only until these policies, and no others, are told apart
@@ -88,7 +88,7 @@ struct RunSummary {
 RunSummary run_suite(Suite suite, const std::string& directory, const RunOptions& options, Progress& progress);
 
 // The run.json of a new run, but for its plan.
-RunInfo new_run_info(const Experiment& experiment, const KeptSuite& kept, const std::vector<std::string>& argv,
+RunInfo new_run_info(const Experiment& experiment, const ArchivedSuite& kept, const std::vector<std::string>& argv,
                      const nlohmann::json& certificate);
 
 }  // namespace duet

@@ -177,7 +177,7 @@ class Verifier {
   // A run that does not say what was asked for is held against the whole suite: else who leaves rows out would leave
   // that out, too.
   [[nodiscard]] bool is_wanted(const EpisodeSpec& spec) const {
-    return !run_.info.plan || std::ranges::any_of(run_.info.plan->parts, [&](const RunPart& part) {
+    return !run_.info.plan || std::ranges::any_of(run_.info.plan->parts, [&](const EpisodeFilter& part) {
       return belongs(spec, spec.clip->task, part);
     });
   }
@@ -212,7 +212,7 @@ class Verifier {
     for (std::size_t i = 0; i < marked.size(); ++i)
       if (refused[i] == 0)
         result_.faults.push_back(fmt::format("{}: is marked as unsupported ({}), and this machine runs it",
-                                             text_of(*marked[i]), shown(marked[i]->message)));
+                                             text_of(*marked[i]), excerpt(marked[i]->message)));
   }
 
   // Some of them, without replacement, from a seeded shuffle.

@@ -98,21 +98,21 @@ ColumnBinding bind_by_name(const std::string& path, const std::vector<std::strin
   for (const std::string& name : names) {
     const int joint = joint_of(robot, name);
     if (joint >= 0 && std::find(named.begin(), named.end(), joint) != named.end())
-      throw InputError(fmt::format("'{}': joint '{}' stands twice", path, shown(name)));
+      throw InputError(fmt::format("'{}': joint '{}' stands twice", path, excerpt(name)));
     named.push_back(joint);
     if (joint < 0) foreign.push_back(name);
     if (joint >= 0) std::erase(missing, robot.joints[static_cast<std::size_t>(joint)].name);
   }
   if (missing.size() * 2 > robot.joints.size())
     throw InputError(fmt::format("'{}': expected the joints of robot '{}', found {}", path, robot.name,
-                                 shown(fmt::format("{}", fmt::join(names, ", ")))));
+                                 excerpt(fmt::format("{}", fmt::join(names, ", ")))));
   ColumnBinding binding{.depth_first = named, .breadth_first = named};
   binding.evidence.push_back(fmt::format("joints: {}, bound by name", names.size() - foreign.size()));
   if (!missing.empty())
     binding.evidence.push_back(fmt::format("held straight, not in the file: {}", fmt::join(missing, ", ")));
   if (!foreign.empty())
     binding.evidence.push_back(
-        fmt::format("left out, not of '{}': {}", robot.name, shown(fmt::format("{}", fmt::join(foreign, ", ")))));
+        fmt::format("left out, not of '{}': {}", robot.name, excerpt(fmt::format("{}", fmt::join(foreign, ", ")))));
   return binding;
 }
 

@@ -41,7 +41,7 @@ MotionSource open_folder(const std::string& path) {
     if (source.files.size() == kMostFolderFiles)
       throw InputError(
           fmt::format("'{}': expected the folder of one motion, found more than {} files", path, kMostFolderFiles));
-    std::string content = read_data(inside(path, name), left);
+    std::string content = read_data(join_without_links(path, name), left);
     left -= static_cast<std::int64_t>(content.size());
     source.files.emplace(name, std::move(content));
   }
@@ -115,7 +115,7 @@ std::vector<std::string> column_names(const CsvReader& rows) {
   std::vector<std::string> columns;
   for (const std::string& field : rows.fields()) {
     if (std::find(columns.begin(), columns.end(), field) != columns.end())
-      rows.fail(fmt::format("column '{}' stands twice", shown(field)));
+      rows.fail(fmt::format("column '{}' stands twice", excerpt(field)));
     columns.push_back(field);
   }
   return columns;
@@ -125,7 +125,7 @@ void take_numbers(const CsvReader& rows, std::vector<double>& values) {
   const auto fields = rows.fields();
   for (std::size_t c = 0; c < fields.size(); ++c) {
     const std::optional<double> value = rows.number(fields[c]);
-    if (!value) rows.fail(fmt::format("column {}: expected a finite number, found '{}'", c + 1, shown(fields[c])));
+    if (!value) rows.fail(fmt::format("column {}: expected a finite number, found '{}'", c + 1, excerpt(fields[c])));
     values.push_back(*value);
   }
 }
@@ -140,7 +140,7 @@ int CsvTable::find(std::string_view column) const {
 int CsvTable::get(std::string_view column) const {
   if (const int found = find(column); found >= 0) return found;
   throw InputError(fmt::format("'{}': no column '{}'. It has: {}", name, column,
-                               shown(fmt::format("{}", fmt::join(columns, ", ")), kShownSentence)));
+                               excerpt(fmt::format("{}", fmt::join(columns, ", ")), kShownSentence)));
 }
 
 CsvTable parse_csv_table(std::string_view text, const std::string& name) {

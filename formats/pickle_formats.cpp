@@ -94,7 +94,7 @@ const PickleNode& chosen_motion(const Pickle& pickle, const std::string& name) {
   const std::vector<std::string> names = library.keys();
   if (name.empty() && names.size() != 1)
     throw InputError(fmt::format("'{}': holds {} motions, name one of them: {}", pickle.name, names.size(),
-                                 shown(fmt::format("{}", fmt::join(names, ", ")), kShownSentence)));
+                                 excerpt(fmt::format("{}", fmt::join(names, ", ")), kShownSentence)));
   return library.get(name.empty() ? names.front() : name);
 }
 

@@ -90,7 +90,7 @@ std::pair<Eigen::Index, Eigen::Index> chosen_frames(const MotionSource& source, 
   const std::optional<double> number = motion.empty() ? 0.0 : parse_number(motion);
   for (std::size_t i = 0; i < count; ++i)
     if (number && *number == static_cast<double>(i)) return {points[i], points[i + 1]};
-  throw InputError(fmt::format("'{}': no motion '{}', expected 0 to {}", source.path, shown(motion), count - 1));
+  throw InputError(fmt::format("'{}': no motion '{}', expected 0 to {}", source.path, excerpt(motion), count - 1));
 }
 
 FileMotion read_locomujoco(const MotionSource& source, const RobotModel& /*robot*/, const RobotMotionOptions& options) {

@@ -154,7 +154,7 @@ void take_named_columns(const CsvTable& table, FileMotion& motion) {
     throw InputError(
         fmt::format("'{}': line 1 names columns, but not the root's x, y, z and quaternion (root_x, "
                     "root_y, root_z, qx, qy, qz, qw): {}",
-                    table.name, shown(fmt::format("{}", fmt::join(table.columns, ", ")), kShownSentence)));
+                    table.name, excerpt(fmt::format("{}", fmt::join(table.columns, ", ")), kShownSentence)));
   std::vector<int> rows;
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
     const int column = static_cast<int>(c);

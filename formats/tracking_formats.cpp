@@ -172,7 +172,7 @@ std::vector<int> body_numbers(const MotionSource& source) {
       throw InputError(
           fmt::format("'{}/metadata.txt': body part indexes: expected a whole number of 0 or more, found "
                       "'{}'",
-                      source.path, shown(word)));
+                      source.path, excerpt(word)));
     numbers.push_back(static_cast<int>(*number));
     at = list.find_first_not_of(kBetween, stop);
   }

@@ -68,11 +68,11 @@ void judge(RegionContact& figures, const RegionLimits& limits) {
       std::max(ratio(figures.settled_force, settled), ratio(figures.quasi_static_force, limits.quasi_static_n));
   figures.worst_ratio = std::max({figures.quasi_static_ratio, figures.transient_ratio, figures.pressure_ratio});
   if (!limits.transient_allowed && figures.transient_contacts > 0)
-    figures.verdict = ContactVerdict::kNotAllowed;
+    figures.verdict = ContactFinding::kNotAllowed;
   else if (!figures.worst_ratio)
-    figures.verdict = ContactVerdict::kUnlimited;
+    figures.verdict = ContactFinding::kUnlimited;
   else
-    figures.verdict = *figures.worst_ratio > 1.0 + kRounding ? ContactVerdict::kOver : ContactVerdict::kWithin;
+    figures.verdict = *figures.worst_ratio > 1.0 + kRounding ? ContactFinding::kOver : ContactFinding::kWithin;
 }
 
 void sum_up(ContactSafetyResult& result) {
@@ -280,15 +280,15 @@ ContactSafetyResult ContactSafety::result() const {
 
 // Contact safety as names and numbers for rows, and as text.
 
-std::string_view contact_verdict_name(ContactVerdict verdict) {
+std::string_view contact_verdict_name(ContactFinding verdict) {
   switch (verdict) {
-    case ContactVerdict::kWithin:
+    case ContactFinding::kWithin:
       return "within";
-    case ContactVerdict::kUnlimited:
+    case ContactFinding::kUnlimited:
       return "unlimited";
-    case ContactVerdict::kOver:
+    case ContactFinding::kOver:
       return "over";
-    case ContactVerdict::kNotAllowed:
+    case ContactFinding::kNotAllowed:
       return "not allowed";
   }
   return "";

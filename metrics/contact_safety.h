@@ -104,8 +104,8 @@ struct ContactSafetyOptions {
 std::vector<double> link_radii(const RobotModel& robot);
 
 // From the best to the worst.
-enum class ContactVerdict { kWithin, kUnlimited, kOver, kNotAllowed };
-std::string_view contact_verdict_name(ContactVerdict verdict);  // "within", "unlimited", "over", "not allowed"
+enum class ContactFinding { kWithin, kUnlimited, kOver, kNotAllowed };
+std::string_view contact_verdict_name(ContactFinding verdict);  // "within", "unlimited", "over", "not allowed"
 
 struct RegionContact {
   std::string region;
@@ -135,7 +135,7 @@ struct RegionContact {
   // settled_force against the transient limit, or quasi_static_ratio where that is larger: what is left of the ratios
   // where the first blow of each contact is forgiven.
   std::optional<double> settled_ratio;
-  ContactVerdict verdict = ContactVerdict::kWithin;  // a ratio of exactly 1 is within
+  ContactFinding verdict = ContactFinding::kWithin;  // a ratio of exactly 1 is within
 };
 
 // A contact as it is measured: by indices, from the first step's begin.
@@ -157,7 +157,7 @@ struct ContactSafetyResult {
   double impulse = 0.0;                      // of all regions [N s]
   std::optional<double> worst_ratio = {};    // largest of the regions; 0 without contact, absent without any limit
   std::optional<double> settled_ratio = {};  // likewise
-  ContactVerdict verdict = ContactVerdict::kWithin;  // worst of the regions that were touched
+  ContactFinding verdict = ContactFinding::kWithin;  // worst of the regions that were touched
   std::string limits;                                // "iso_ts_15066 (unverified limits)"
   bool limits_verified = false;
 };

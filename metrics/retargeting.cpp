@@ -30,7 +30,7 @@ struct ScoredMotion {
         source_partner(motion.source_partner.joints),
         source_reactor(motion.source_reactor.joints),
         reshaped(motion.reshaped) {}
-  ScoredMotion(const RobotMotion& executed, const PointTracks& person, const ActSource& source)
+  ScoredMotion(const RobotMotion& executed, const PointTracks& person, const ScoringReference& source)
       : robot(executed),
         partner(person),
         source_partner(source.partner.joints),
@@ -183,7 +183,7 @@ int act_frames(const Recording& recording) {
   return std::min(recording.phases.act_end, recording.frames()) - act_begin(recording);
 }
 
-std::map<std::string, double> retargeting_metrics(const Recording& recording, const ActSource& source,
+std::map<std::string, double> retargeting_metrics(const Recording& recording, const ScoringReference& source,
                                                   const RobotModel& robot, const MetricReadings& readings) {
   const int begin = act_begin(recording), frames = act_frames(recording);
   RobotMotion executed;

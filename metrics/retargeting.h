@@ -66,7 +66,7 @@ std::vector<HingeGroup> hinge_groups(const RobotModel& robot);
 std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, const RobotModel& robot,
                                                   const MetricReadings& readings = {});
 // References that an executed act is held against, over the frames that it had before its episode ended.
-struct ActSource {
+struct ScoringReference {
   HumanMotion partner;   // H_p as in the clip, whatever the perturbation made of it
   HumanMotion reactor;   // H_s
   PointTracks reshaped;  // empty: not known
@@ -75,7 +75,7 @@ struct ActSource {
 int act_frames(const Recording& recording);
 // The 18 of the act that a recording executed, in the place of the retargeted motion: they then say what the engine and
 // the controller cost.
-std::map<std::string, double> retargeting_metrics(const Recording& recording, const ActSource& source,
+std::map<std::string, double> retargeting_metrics(const Recording& recording, const ScoringReference& source,
                                                   const RobotModel& robot, const MetricReadings& readings = {});
 // The metrics that a robot's motion has by itself: large_angle_ratio, angle_std, jerk_mean, jerk_std.
 std::map<std::string, double> motion_metrics(const RobotMotion& motion, const RobotModel& robot,

@@ -154,7 +154,7 @@ std::vector<Eigen::Vector3d> vertices_of_obj(std::string_view text, const std::s
       const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
       if (error != std::errc() || stop != word.data() + word.size())
         throw InputError(
-            fmt::format("'{}': line {}: expected a vertex 'v x y z', found '{}'", file, number, shown(word)));
+            fmt::format("'{}': line {}: expected a vertex 'v x y z', found '{}'", file, number, excerpt(word)));
     }
     check_point(vertex, fmt::format("'{}': line {}", file, number));
     vertices.push_back(vertex);
@@ -164,7 +164,7 @@ std::vector<Eigen::Vector3d> vertices_of_obj(std::string_view text, const std::s
 
 Eigen::Vector3d vector_of(const nlohmann::json& value, const std::string& where) {
   if (!value.is_array() || value.size() != 3 || !value[0].is_number() || !value[1].is_number() || !value[2].is_number())
-    throw InputError(fmt::format("{}: expected three numbers, found {}", where, shown(dumped(value))));
+    throw InputError(fmt::format("{}: expected three numbers, found {}", where, excerpt(dumped(value))));
   const Eigen::Vector3d vector(value[0].get<double>(), value[1].get<double>(), value[2].get<double>());
   check_point(vector, where);
   return vector;
@@ -189,7 +189,7 @@ std::vector<Eigen::Vector3d> points_of_json(const std::string& text, const std::
     throw InputError(fmt::format("'{}': expected an object with either 'points' or 'box'", file));
   for (const auto& [key, value] : root.items())
     if (key != "points" && key != "box" && !(key == "centre" && root.contains("box")))
-      throw InputError(fmt::format("'{}': unknown key '{}'; known: points, or box and centre", file, shown(key)));
+      throw InputError(fmt::format("'{}': unknown key '{}'; known: points, or box and centre", file, excerpt(key)));
   if (root.contains("box")) return corners_of(root, file);
   const nlohmann::json& list = root["points"];
   if (!list.is_array()) throw InputError(fmt::format("'{}': 'points': expected a list of points", file));
@@ -221,7 +221,7 @@ Eigen::Matrix3Xd farthest_points(const Eigen::Matrix3Xd& points, int count) {
 Eigen::Matrix3Xd read_object_keypoints(const std::string& path) {
   const bool is_mesh = path.ends_with(".obj") || path.ends_with(".OBJ");
   if (!is_mesh && !path.ends_with(".json"))
-    throw InputError(fmt::format("'{}': expected the shape of an object as .obj or .json", shown(path)));
+    throw InputError(fmt::format("'{}': expected the shape of an object as .obj or .json", excerpt(path)));
   const std::string text = read_plain_text(path, kMostShapeBytes);
   const std::vector<Eigen::Vector3d> points = is_mesh ? vertices_of_obj(text, path) : points_of_json(text, path);
   if (points.empty()) throw InputError(fmt::format("'{}': expected points of an object, found none", path));

@@ -12,7 +12,7 @@ namespace duet {
 namespace {
 
 [[noreturn]] void refuse(const Npz& npz, const std::string& key, const std::string& fault) {
-  throw InputError(fmt::format("'{}': key '{}': {}", npz.name(), shown(key), fault));
+  throw InputError(fmt::format("'{}': key '{}': {}", npz.name(), excerpt(key), fault));
 }
 
 int checked_frame(const Npz& npz, const std::string& key, std::int64_t value) {
@@ -32,7 +32,7 @@ void put_schema(Npz& npz, const std::string& schema, std::int64_t version) {
 void check_schema(const Npz& npz, const std::string& schema, std::int64_t version, std::vector<std::string> known,
                   const std::vector<std::string>& prefixes) {
   const std::string found = npz.text("schema");
-  if (found != schema) refuse(npz, "schema", fmt::format("expected '{}', found '{}'", schema, shown(found)));
+  if (found != schema) refuse(npz, "schema", fmt::format("expected '{}', found '{}'", schema, excerpt(found)));
   const std::int64_t found_version = npz.integer("schema_version");
   if (found_version != version)
     refuse(npz, "schema_version", fmt::format("expected {}, found {}", version, found_version));
@@ -55,8 +55,8 @@ void put_task(Npz& npz, Task task, Person reactor, const Phases& phases, double 
 std::string get_id(const Npz& npz, const std::string& key) {
   constexpr std::size_t kLongestId = 200;  // [bytes]: an id stands in names of files and in every row
   std::string id = npz.text(key);
-  if (id.empty() || shown(id, kLongestId) != id)
-    refuse(npz, key, fmt::format("expected 1 to {} printable characters, found '{}'", kLongestId, shown(id)));
+  if (id.empty() || excerpt(id, kLongestId) != id)
+    refuse(npz, key, fmt::format("expected 1 to {} printable characters, found '{}'", kLongestId, excerpt(id)));
   return id;
 }
 
@@ -71,7 +71,7 @@ Task get_task(const Npz& npz) {
 
 Person get_reactor(const Npz& npz) {
   const std::string name = npz.text("reactor");
-  if (name != "A" && name != "B") refuse(npz, "reactor", fmt::format("expected 'A' or 'B', found '{}'", shown(name)));
+  if (name != "A" && name != "B") refuse(npz, "reactor", fmt::format("expected 'A' or 'B', found '{}'", excerpt(name)));
   return name == "A" ? Person::kA : Person::kB;
 }
 
@@ -98,7 +98,7 @@ std::vector<int> get_joint_columns(const Npz& npz) {
   for (int column = 0; column < kSmplJoints; ++column) {
     const int joint = smpl_index(names[column]);
     if (joint < 0) refuse(npz, key, unknown_name_message("joint", names[column], smpl_names()));
-    if (columns[joint] >= 0) refuse(npz, key, fmt::format("joint '{}' is there twice", shown(names[column])));
+    if (columns[joint] >= 0) refuse(npz, key, fmt::format("joint '{}' is there twice", excerpt(names[column])));
     columns[joint] = column;
   }
   return columns;
@@ -144,7 +144,7 @@ std::map<std::string, std::string> get_texts(const Npz& npz, const std::string& 
   const std::vector<std::string> values = npz.strings(key + "_values", {static_cast<long>(names.size())});
   for (std::size_t i = 0; i < names.size(); ++i)
     if (!texts.emplace(names[i], values[i]).second)
-      refuse(npz, key + "_names", fmt::format("'{}' is there twice", shown(names[i])));
+      refuse(npz, key + "_names", fmt::format("'{}' is there twice", excerpt(names[i])));
   return texts;
 }
 

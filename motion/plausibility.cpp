@@ -200,8 +200,8 @@ Plausibility judge_people(const InteractionClip& clip) {
   return found;
 }
 
-ForeignClip read_foreign_clip(const Npz& npz, Implausible implausible) {
-  ForeignClip read{read_clip(npz), {}};
+ImportedClip read_foreign_clip(const Npz& npz, Implausible implausible) {
+  ImportedClip read{read_clip(npz), {}};
   const InteractionClip& clip = read.clip;
   const Plausibility found = judge_people(clip);
   const auto note = [&](const std::string& sentence) {

@@ -39,13 +39,13 @@ Plausibility judge_people(const InteractionClip& clip);
 
 // A clip from a file that others may have written, and what its reader should know: phases that were proposed,
 // oddities.
-struct ForeignClip {
+struct ImportedClip {
   InteractionClip clip;
   std::vector<std::string> notes;
 };
 
 // Faults are refused with an InputError that names the file, or taken and noted.
-enum class Implausible { kRefused, kTaken };
-ForeignClip read_foreign_clip(const Npz& npz, Implausible implausible = Implausible::kRefused);
+enum class Implausible { kRefused, kAllowed };
+ImportedClip read_foreign_clip(const Npz& npz, Implausible implausible = Implausible::kRefused);
 
 }  // namespace duet

@@ -12,7 +12,7 @@ enum class Side { kLeft, kRight };
 
 // The way in which the two act: that of the first generator (long acts, three metres apart at the start), or that of
 // recorded people (docs/synthesis.md).
-enum class Likeness { kRehearsed, kPeople };
+enum class Likeness { kScripted, kPeople };
 
 // How an act goes: done, done after a half-raised hand has waited, or broken off before anything touches.
 enum class ActOutcome { kComplete, kHesitant, kAborted };
@@ -31,7 +31,7 @@ struct SynthesisOptions {
   std::optional<double> style{};                 // 0 restrained ... 1 expansive
   std::optional<double> duration{};              // of the whole clip [s]; default as in Table S6 per task
   double rate_hz = 50.0;
-  Likeness like = Likeness::kRehearsed;
+  Likeness like = Likeness::kScripted;
   // With kPeople only; such clips are cropped to the act unless told:
   std::optional<double> before{};       // standing before anything moves [s]
   std::optional<double> after{};        // standing after everything [s]

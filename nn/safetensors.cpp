@@ -103,9 +103,9 @@ class Reader {
 
  private:
   [[noreturn]] void refuse(const std::string& tensor, const std::string& problem) const {
-    throw InputError(tensor.empty()
-                         ? fmt::format("'{}': safetensors: {}", file_, shown(problem, kShownSentence))
-                         : fmt::format("'{}': tensor '{}': {}", file_, shown(tensor), shown(problem, kShownSentence)));
+    throw InputError(tensor.empty() ? fmt::format("'{}': safetensors: {}", file_, excerpt(problem, kShownSentence))
+                                    : fmt::format("'{}': tensor '{}': {}", file_, excerpt(tensor),
+                                                  excerpt(problem, kShownSentence)));
   }
 
   [[nodiscard]] Json parsed(std::string_view text) const {
@@ -119,7 +119,7 @@ class Reader {
     if (!value.is_object()) refuse(kMetadata, fmt::format("expected an object, found {}", value.type_name()));
     for (const auto& [key, text] : value.items()) {
       if (!text.is_string())
-        refuse(kMetadata, fmt::format("'{}': expected a string, found {}", shown(key), text.type_name()));
+        refuse(kMetadata, fmt::format("'{}': expected a string, found {}", excerpt(key), text.type_name()));
       metadata[key] = text.get<std::string>();
     }
     return metadata;
@@ -151,7 +151,7 @@ class Reader {
       known.push_back(type.name);
     }
     refuse(name, fmt::format("dtype: expected one of {}, found '{}'", fmt::join(known, ", "),
-                             shown(found->get_ref<const std::string&>())));
+                             excerpt(found->get_ref<const std::string&>())));
   }
 
   [[nodiscard]] std::vector<std::uint64_t> naturals(const std::string& name, const Json& value, const char* key) const {
@@ -305,7 +305,7 @@ Eigen::MatrixXf columns_of(const SafeTensors& content, const std::string& name, 
   const Tensor& found = tensor_named(content, name, file);
   if (found.shape != std::vector<std::int64_t>{columns, rows})
     throw InputError(fmt::format("{}: tensor '{}': expected shape ({}, {}), found ({})", file, name, columns, rows,
-                                 shown(fmt::format("{}", fmt::join(found.shape, ", ")))));
+                                 excerpt(fmt::format("{}", fmt::join(found.shape, ", ")))));
   return Eigen::Map<const Eigen::MatrixXf>(found.values.data(), rows, columns);
 }
 
@@ -318,7 +318,7 @@ std::string text_of(const SafeTensors& content, const std::string& key, const st
 double number_of(const SafeTensors& content, const std::string& key, const std::string& file) {
   const std::string text = text_of(content, key, file);
   const std::optional<double> value = parse_number(text);
-  if (!value) throw InputError(fmt::format("{}: '{}': expected a number, found '{}'", file, key, shown(text)));
+  if (!value) throw InputError(fmt::format("{}: '{}': expected a number, found '{}'", file, key, excerpt(text)));
   return *value;
 }
 
@@ -326,7 +326,7 @@ void expect_text(const SafeTensors& content, const std::string& key, const std::
                  const std::string& file) {
   const std::string found = text_of(content, key, file);
   if (found != expected)
-    throw InputError(fmt::format("{}: {}: expected '{}', found '{}'", file, key, expected, shown(found, kShownText)));
+    throw InputError(fmt::format("{}: {}: expected '{}', found '{}'", file, key, expected, excerpt(found, kShownText)));
 }
 
 }  // namespace duet

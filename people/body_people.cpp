@@ -22,9 +22,9 @@ void check_clock(const std::array<BodyMotion, 2>& people) {
   const auto& [a, b] = people;
   if (a.frames() != b.frames())
     throw InputError(fmt::format("'{}' has {} frames and '{}' {}: expected two people of the same length",
-                                 shown(a.file), a.frames(), shown(b.file), b.frames()));
+                                 excerpt(a.file), a.frames(), excerpt(b.file), b.frames()));
   if (a.frames() < 2)
-    throw InputError(fmt::format("'{}': expected at least 2 frames, found {}", shown(a.file), a.frames()));
+    throw InputError(fmt::format("'{}': expected at least 2 frames, found {}", excerpt(a.file), a.frames()));
 }
 
 void pose(RawPeople& raw, std::size_t who, BodyMotion motion, const BodyModel& model) {
@@ -76,7 +76,7 @@ void add_people(RawPeople& raw, BodyPeople people, const PeopleOptions& options)
     throw InputError(
         fmt::format("'{}', '{}': each person was recorded in a world of its own: state how they come into "
                     "one (align floor, align contact)",
-                    shown(a.file), shown(b.file)));
+                    excerpt(a.file), excerpt(b.file)));
   const BodyModel model = options.body_model.empty() ? average_body() : load_body_model(options.body_model);
   raw.layout = &joint_layout("smpl-24");
   raw.source["format"] = people.format;
@@ -158,7 +158,7 @@ double heading_at(const RawPeople& raw, const PointTracks& joints, int t) {
   try {
     return heading(joints, t);
   } catch (const std::invalid_argument& error) {
-    throw InputError(fmt::format("'{}': alignment: {}", shown(raw.name), error.what()));
+    throw InputError(fmt::format("'{}': alignment: {}", excerpt(raw.name), error.what()));
   }
 }
 
@@ -232,7 +232,7 @@ Pose contact_pose(const RawPeople& raw, const Levelled& levelled, std::string& s
     throw InputError(
         fmt::format("'{}': align contact: expected hands that can meet, found them {:.2f} m apart in height "
                     "at best (frame {}); align floor asks for no contact",
-                    shown(raw.name), std::abs(meeting.gap), meeting.frame));
+                    excerpt(raw.name), std::abs(meeting.gap), meeting.frame));
   Pose X = facing(raw, levelled, meeting.frame);
   const double rate_hz = raw.rate_hz > 0.0 ? raw.rate_hz : kUsualRate;
   const int half = static_cast<int>(std::lround(kMeetingTime * rate_hz));

@@ -41,14 +41,14 @@ std::string id_below(const std::string& path, const std::string& folder) {
 std::vector<std::string> files_at(const std::string& path, const std::function<bool(const std::string& name)>& wanted) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) throw InputError(fmt::format("cannot read '{}': no such file or folder", shown(path)));
+  if (!fs::exists(status)) throw InputError(fmt::format("cannot read '{}': no such file or folder", excerpt(path)));
   if (!fs::is_directory(status) && !wanted(fs::path(path).filename().string()))
-    throw InputError(fmt::format("'{}': expected a folder, or a file of the format's name", shown(path)));
+    throw InputError(fmt::format("'{}': expected a folder, or a file of the format's name", excerpt(path)));
   if (!fs::is_directory(status)) return {path};
   std::vector<std::string> files;
   visit_files(
       path, wanted, [&](const std::string& file) { return files.push_back(file), files.size() < kMostFiles; }, error);
-  if (error) throw InputError(fmt::format("cannot read '{}': {}", shown(path), error.message()));
+  if (error) throw InputError(fmt::format("cannot read '{}': {}", excerpt(path), error.message()));
   std::sort(files.begin(), files.end());
   return files;
 }
@@ -82,8 +82,8 @@ std::vector<ClipPlace> pairs_at(std::span<const std::string> paths,
     throw InputError(fmt::format("{}: expected two paths, one per person, found {}", format, paths.size()));
   const bool folder_a = fs::is_directory(paths[0]), folder_b = fs::is_directory(paths[1]);
   if (folder_a != folder_b)
-    throw InputError(fmt::format("'{}', '{}': expected two files or two folders, found one of each", shown(paths[0]),
-                                 shown(paths[1])));
+    throw InputError(fmt::format("'{}', '{}': expected two files or two folders, found one of each", excerpt(paths[0]),
+                                 excerpt(paths[1])));
   const std::vector<std::string> a = files_at(paths[0], wanted), b = files_at(paths[1], wanted);
   if (!folder_a) return {{.id = file_stem(a[0]) + "-" + file_stem(b[0]), .files = {a[0], b[0]}, .entry = ""}};
   std::map<std::string, std::string> of_b;
@@ -96,7 +96,7 @@ std::vector<ClipPlace> pairs_at(std::span<const std::string> paths,
   }
   if (clips.empty())
     throw InputError(
-        fmt::format("'{}', '{}': no two files of the same name in both folders", shown(paths[0]), shown(paths[1])));
+        fmt::format("'{}', '{}': no two files of the same name in both folders", excerpt(paths[0]), excerpt(paths[1])));
   return clips;
 }
 
@@ -107,7 +107,7 @@ std::vector<ClipPlace> clips_at(std::span<const std::string> paths,
     for (const std::string& file : files_at(path, wanted))
       clips.push_back({.id = id_below(file, fs::is_directory(path) ? path : ""), .files = {file}, .entry = ""});
   if (clips.empty())
-    throw InputError(fmt::format("'{}': no file of {} found", paths.empty() ? "" : shown(paths[0]), format));
+    throw InputError(fmt::format("'{}': no file of {} found", paths.empty() ? "" : excerpt(paths[0]), format));
   return clips;
 }
 

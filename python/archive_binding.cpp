@@ -151,7 +151,7 @@ std::string score(const Archive& archive, const Texts& readings, const std::stri
   }
   const auto robot = load_shared_robot(card);
   const ClipScore scored =
-      score_clip(load_or_retarget(archive.npz, *robot, {}, Implausible::kTaken).motion, robot, options);
+      score_clip(load_or_retarget(archive.npz, *robot, {}, Implausible::kAllowed).motion, robot, options);
   return dumped(score_json({scored}, summarize_scores({scored}, options.readings.metrics)).at("clips").at(0));
 }
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "duet/core/require.h"
-#include "duet/execution/led_episodes.h"
+#include "duet/execution/stepped_episodes.h"
 #include "duet/experiment/plan/shipped_suites.h"
 #include "duet/policies/language.h"
 #include "duet/policies/plan_queue.h"
@@ -34,16 +34,16 @@ const RobotModel& robot_of(const Experiment& experiment) { return *experiment.at
 
 class EpisodeBatch {
  public:
-  EpisodeBatch(std::shared_ptr<const Experiment> experiment, int n, Led led)
+  EpisodeBatch(std::shared_ptr<const Experiment> experiment, int n, DrivenBodies led)
       : experiment_(std::move(experiment)), led_(led) {
     require(n >= 1 && n <= 4096, "n: expected 1 to 4096 episodes, found {}", n);
     joints_ = robot().dof();
     numbers_ = 91 + 2 * joints_;
-    for (int i = 0; i < n; ++i) episodes_.push_back(std::make_unique<LedEpisode>(experiment_, led));
+    for (int i = 0; i < n; ++i) episodes_.push_back(std::make_unique<SteppedEpisode>(experiment_, led));
     frames_.resize(static_cast<std::size_t>(n) * kHistoryFrames * numbers_);
     root_.resize(static_cast<std::size_t>(n) * 7);
     hold_.resize(static_cast<std::size_t>(n) * kAnchors * width());
-    if (led_ == Led::kBoth) partner_ahead_.resize(static_cast<std::size_t>(n) * kAhead);
+    if (led_ == DrivenBodies::kBoth) partner_ahead_.resize(static_cast<std::size_t>(n) * kAhead);
     over_.assign(n, 1);
     success_.assign(n, 0);
     tick_.assign(n, 0);
@@ -53,7 +53,7 @@ class EpisodeBatch {
   [[nodiscard]] int size() const { return static_cast<int>(episodes_.size()); }
   [[nodiscard]] int joints() const { return joints_; }
   [[nodiscard]] int width() const { return 7 + joints_; }
-  [[nodiscard]] bool leads_partner() const { return led_ == Led::kBoth; }
+  [[nodiscard]] bool leads_partner() const { return led_ == DrivenBodies::kBoth; }
 
   // Begins episode numbers[i] at place places[i]; all compute at once.
   void reset(const std::vector<int>& places, const std::vector<int>& numbers) {
@@ -133,8 +133,8 @@ class EpisodeBatch {
   [[nodiscard]] const RobotModel& robot() const { return robot_of(*experiment_); }
 
   std::shared_ptr<const Experiment> experiment_;
-  Led led_;
-  std::vector<std::unique_ptr<LedEpisode>> episodes_;
+  DrivenBodies led_;
+  std::vector<std::unique_ptr<SteppedEpisode>> episodes_;
   int joints_ = 0;
 };
 
@@ -206,10 +206,10 @@ void step_batch(EpisodeBatch& batch, const Numbers& plans, const std::optional<N
   batch.step(data, rows, ahead);
 }
 
-std::shared_ptr<Experiment> led_suite(const std::string& suite, const Overrides& overrides, const LedPart& part,
+std::shared_ptr<Experiment> led_suite(const std::string& suite, const Overrides& overrides, const SteppedPart& part,
                                       int threads) {
   Progress quiet(Progress::Style::kQuiet);
-  return led_experiment(load_suite(suite_file(suite), overrides), part, threads, quiet);
+  return stepped_experiment(load_suite(suite_file(suite), overrides), part, threads, quiet);
 }
 
 std::tuple<std::string, std::string, std::string> about_episode(const Experiment& experiment, int episode) {
@@ -232,7 +232,7 @@ std::vector<double> list_of(const Eigen::VectorXd& values) { return {values.begi
 
 void add_environment(py::module_& module) {
   const auto released = py::call_guard<py::gil_scoped_release>();
-  py::class_<Experiment, std::shared_ptr<Experiment>>(module, "LedSuite", "What episodes are drawn from.")
+  py::class_<Experiment, std::shared_ptr<Experiment>>(module, "EpisodeEnvironment", "What episodes are drawn from.")
       .def(py::init([](const std::string& suite, const Overrides& overrides, const std::string& engine,
                        const std::string& controller, const std::string& task, const std::string& perturbation,
                        int threads) {
@@ -248,7 +248,8 @@ void add_environment(py::module_& module) {
       .def_property_readonly("upper", [](const Experiment& suite) { return list_of(robot_of(suite).upper()); });
   py::class_<EpisodeBatch>(module, "EpisodeBatch", "Episodes that are led in step.")
       .def(py::init([](const std::shared_ptr<Experiment>& suite, int n, bool leads_partner) {
-             return std::make_unique<EpisodeBatch>(suite, n, leads_partner ? Led::kBoth : Led::kRobot);
+             return std::make_unique<EpisodeBatch>(suite, n,
+                                                   leads_partner ? DrivenBodies::kBoth : DrivenBodies::kRobot);
            }),
            py::arg("suite"), py::arg("n"), py::arg("leads_partner") = false)
       .def("__len__", &EpisodeBatch::size)

@@ -218,7 +218,7 @@ void add_file(const std::string& file, const std::string& card, std::vector<Repl
   ReplayScene scene = kind == MotionFile::kClip ? scene_of_clip(file, npz) : scene_of_paired(file, npz, card);
   if (std::ranges::find(scenes, scene.id, &ReplayScene::id) != scenes.end())
     throw InputError(fmt::format("'{}': '{}' is among the files already; each motion has a scene of its own", file,
-                                 shown(scene.id)));
+                                 excerpt(scene.id)));
   scenes.push_back(std::move(scene));
 }
 
@@ -256,7 +256,7 @@ ReplayContent replay_of_files(const std::vector<std::string>& files, const std::
   ReplayContent content;
   content.title = fs::path(files.front()).filename().string();
   content.limits = load_contact_limits(default_contact_limits_path());
-  for (const std::string& file : files) naming_file(file, [&] { add_file(file, card, content.scenes); });
+  for (const std::string& file : files) with_file_context(file, [&] { add_file(file, card, content.scenes); });
   return content;
 }
 

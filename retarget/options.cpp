@@ -15,7 +15,7 @@ namespace {
 
 using Options = PairOptions;
 
-FieldWords words(const char* name, const char* meaning, FieldRange range = {}, const char* unit = "") {
+FieldDoc words(const char* name, const char* meaning, FieldRange range = {}, const char* unit = "") {
   return {.name = name, .meaning = meaning, .unit = unit, .range = range};
 }
 

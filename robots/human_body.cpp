@@ -67,7 +67,7 @@ constexpr RegionStiffness kStiffness[] = {{"head", 75.0}, {"neck", 50.0},   {"ch
 
 }  // namespace
 
-Skin default_skin(std::string_view region) {
+ContactCompliance default_skin(std::string_view region) {
   for (const RegionStiffness& entry : kStiffness)
     if (entry.region == region) return {.stiffness = 1000.0 * entry.newton_per_millimetre};
   throw std::invalid_argument(fmt::format("human body: no region '{}'", region));

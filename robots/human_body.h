@@ -12,7 +12,7 @@ namespace duet {
 
 // The skin of the solid partner: a spring and a damper along the normal of a contact, the same in every engine, so that
 // a peak force is a property of the bodies and not of the engine's time step.
-struct Skin {
+struct ContactCompliance {
   double stiffness = 25000.0;  // [N/m]
   double damping = 200.0;      // [N s/m]
 };
@@ -28,7 +28,7 @@ struct HumanCapsule {
   // knuckles.
   double begin = 0.0;
   double end = 1.0;
-  Skin skin = {};
+  ContactCompliance skin = {};
 
   // Ends of the axis for joint positions (3, 24). [m], in their frame.
   [[nodiscard]] std::array<Eigen::Vector3d, 2> ends(const Eigen::Ref<const Eigen::Matrix3Xd>& joints) const;
@@ -40,7 +40,7 @@ struct HumanBody {
 
 // The skin of a region: stiffness from the effective spring constants of ISO/TS 15066 (docs/deviations.md), damping the
 // same everywhere. Throws std::invalid_argument for an unknown region.
-Skin default_skin(std::string_view region);
+ContactCompliance default_skin(std::string_view region);
 
 // `bone_lengths` as from duet::bone_lengths (entry j: joint j to its parent). Throws std::invalid_argument naming a
 // bone that is not finite or not positive.

@@ -101,7 +101,7 @@ JointCommand RobotModel::default_command(const Eigen::VectorXd& q_target) const 
 
 void require_made_for(const std::string& made_for, const RobotModel& robot, const std::string& file) {
   if (made_for != robot.name)
-    throw InputError(fmt::format("{}: made for '{}', the robot is '{}'", file, shown(made_for), robot.name));
+    throw InputError(fmt::format("{}: made for '{}', the robot is '{}'", file, excerpt(made_for), robot.name));
 }
 
 std::shared_ptr<const RobotModel> load_shared_robot(const std::string& name_or_path) {

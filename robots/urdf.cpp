@@ -89,10 +89,10 @@ void refuse_xacro(const TiXmlElement& element, const std::string& file) {
     throw InputError(fmt::format("{}:{}: expected a URDF, found {}: xacro is not expanded; run `xacro {} > robot.urdf`",
                                  file, element.Row(), found, file));
   };
-  if (element.ValueStr().starts_with("xacro:")) refuse(fmt::format("the element <{}>", shown(element.ValueStr())));
+  if (element.ValueStr().starts_with("xacro:")) refuse(fmt::format("the element <{}>", excerpt(element.ValueStr())));
   for (const TiXmlAttribute* one = element.FirstAttribute(); one != nullptr; one = one->Next())
     if (one->ValueStr().find("${") != std::string::npos || one->ValueStr().find("$(") != std::string::npos)
-      refuse(fmt::format("'{}' in an attribute of <{}>", shown(one->ValueStr()), shown(element.ValueStr())));
+      refuse(fmt::format("'{}' in an attribute of <{}>", excerpt(one->ValueStr()), excerpt(element.ValueStr())));
   for (const TiXmlElement* child = element.FirstChildElement(); child != nullptr; child = child->NextSiblingElement())
     refuse_xacro(*child, file);
 }
@@ -139,7 +139,7 @@ std::string reworded(std::string error) {
     if (std::find(sentences.begin(), sentences.end(), sentence) == sentences.end()) sentences.push_back(sentence);
   }
   throw InputError(fmt::format("{}: not a valid URDF: {}", file,
-                               shown(fmt::format("{}", fmt::join(sentences, "; ")), kShownSentence)));
+                               excerpt(fmt::format("{}", fmt::join(sentences, "; ")), kShownSentence)));
 }
 
 urdf::ModelInterfaceSharedPtr parse(const std::string& text, const std::string& file) {
@@ -287,7 +287,7 @@ UrdfModel parse_urdf(const std::string& text, const std::string& file) {
   std::set<std::string> visited;
   const std::function<void(const urdf::Link&)> visit = [&](const urdf::Link& link) {
     if (!visited.insert(link.name).second)
-      throw InputError(fmt::format("{}: link '{}': expected one parent, found two", file, shown(link.name)));
+      throw InputError(fmt::format("{}: link '{}': expected one parent, found two", file, excerpt(link.name)));
     const int index = static_cast<int>(model.links.size());
     model.links.push_back(to_link(link, file));
     for (const urdf::JointSharedPtr& child : link.child_joints) {

@@ -13,7 +13,7 @@ std::string quoted_range(const FieldRange& range) {
   return fmt::format("a number {} {:g}", range.with_low ? ">=" : ">", range.low);
 }
 
-int whole(const YamlSection& section, const FieldWords& words, double value) {
+int whole(const YamlSection& section, const FieldDoc& words, double value) {
   if (value != std::floor(value) || value < words.range.low || value > words.range.high)
     section.fail(section.line(words.name.c_str()),
                  fmt::format("'{}': expected a whole number in [{:.0f}, {:.0f}], found {}", words.name, words.range.low,
@@ -23,7 +23,7 @@ int whole(const YamlSection& section, const FieldWords& words, double value) {
 
 }  // namespace
 
-void read_value(const YamlSection& section, const FieldWords& words, double& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, double& out) {
   const double value = section.number(words.name.c_str());
   const FieldRange& range = words.range;
   if (value > range.high || value < range.low || (value == range.low && !range.with_low))
@@ -32,23 +32,23 @@ void read_value(const YamlSection& section, const FieldWords& words, double& out
   out = value;
 }
 
-void read_value(const YamlSection& section, const FieldWords& words, int& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, int& out) {
   out = whole(section, words, section.number(words.name.c_str()));
 }
 
-void read_value(const YamlSection& section, const FieldWords& words, bool& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, bool& out) {
   out = words.choices.empty() ? section.flag_or(words.name.c_str(), false) : read_choice(section, words) == 1;
 }
 
-void read_value(const YamlSection& section, const FieldWords& words, std::string& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, std::string& out) {
   out = section.text(words.name.c_str());
 }
 
-void read_value(const YamlSection& section, const FieldWords& words, Eigen::Vector3d& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, Eigen::Vector3d& out) {
   out = section.vector3(words.name.c_str());
 }
 
-void read_value(const YamlSection& section, const FieldWords& words, std::vector<double>& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, std::vector<double>& out) {
   const char* key = words.name.c_str();
   const YAML::Node node = section.node(key);
   out.clear();
@@ -61,7 +61,7 @@ void read_value(const YamlSection& section, const FieldWords& words, std::vector
   if (out.empty()) section.fail(section.line(key), fmt::format("'{}': expected numbers, found none", key));
 }
 
-void read_value(const YamlSection& section, const FieldWords& words, std::vector<std::string>& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, std::vector<std::string>& out) {
   const char* key = words.name.c_str();
   out.clear();
   for (const YAML::Node& item : section.items(key)) {
@@ -71,7 +71,7 @@ void read_value(const YamlSection& section, const FieldWords& words, std::vector
   }
 }
 
-std::size_t read_choice(const YamlSection& section, const FieldWords& words) {
+std::size_t read_choice(const YamlSection& section, const FieldDoc& words) {
   const std::string word = section.text(words.name.c_str());
   const auto found = std::ranges::find(words.choices, word);
   if (found == words.choices.end())
@@ -79,7 +79,7 @@ std::size_t read_choice(const YamlSection& section, const FieldWords& words) {
   return static_cast<std::size_t>(found - words.choices.begin());
 }
 
-std::vector<int> whole_numbers(const YamlSection& section, const FieldWords& words) {
+std::vector<int> whole_numbers(const YamlSection& section, const FieldDoc& words) {
   if (!section.has(words.name.c_str())) return {};
   std::vector<double> values;
   read_value(section, words, values);

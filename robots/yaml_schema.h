@@ -48,43 +48,43 @@ inline constexpr FieldRange kPositive = {.low = 0.0, .with_low = false};
 // The value of a key that is there: finite numbers in the words' range, whole numbers, flags and enumerations of the
 // words' choices, texts that are not empty, lists of these, where one number alone is a list of one. Throw InputError:
 // file, line, the mapping, "'key': expected ..., found ...".
-void read_value(const YamlSection& section, const FieldWords& words, double& out);
-void read_value(const YamlSection& section, const FieldWords& words, int& out);
-void read_value(const YamlSection& section, const FieldWords& words, bool& out);
-void read_value(const YamlSection& section, const FieldWords& words, std::string& out);
-void read_value(const YamlSection& section, const FieldWords& words, Eigen::Vector3d& out);
-void read_value(const YamlSection& section, const FieldWords& words, std::vector<double>& out);
-void read_value(const YamlSection& section, const FieldWords& words, std::vector<std::string>& out);
-std::size_t read_choice(const YamlSection& section, const FieldWords& words);
+void read_value(const YamlSection& section, const FieldDoc& words, double& out);
+void read_value(const YamlSection& section, const FieldDoc& words, int& out);
+void read_value(const YamlSection& section, const FieldDoc& words, bool& out);
+void read_value(const YamlSection& section, const FieldDoc& words, std::string& out);
+void read_value(const YamlSection& section, const FieldDoc& words, Eigen::Vector3d& out);
+void read_value(const YamlSection& section, const FieldDoc& words, std::vector<double>& out);
+void read_value(const YamlSection& section, const FieldDoc& words, std::vector<std::string>& out);
+std::size_t read_choice(const YamlSection& section, const FieldDoc& words);
 
 template <typename T>
 requires std::is_enum_v<T>
-void read_value(const YamlSection& section, const FieldWords& words, T& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, T& out) {
   out = static_cast<T>(read_choice(section, words));
 }
 template <typename T>
-void read_value(const YamlSection& section, const FieldWords& words, std::optional<T>& out) {
+void read_value(const YamlSection& section, const FieldDoc& words, std::optional<T>& out) {
   read_value(section, words, out.emplace());
 }
 
 // Whole numbers of a list; "'axes': expected a whole number in [0, 2], found 3".
-std::vector<int> whole_numbers(const YamlSection& section, const FieldWords& words);
+std::vector<int> whole_numbers(const YamlSection& section, const FieldDoc& words);
 
 // A key that has to be there.
 template <typename Owner, typename T>
-SchemaKey<Owner> required_key(const FieldWords& words, T Owner::*member) {
+SchemaKey<Owner> required_key(const FieldDoc& words, T Owner::*member) {
   return {words.name, [=](const YamlSection& section, Owner& owner) { read_value(section, words, owner.*member); }};
 }
 
 // Sets `out` where the key is there.
 template <typename T>
-void read_optional(const YamlSection& section, const FieldWords& words, T& out) {
+void read_optional(const YamlSection& section, const FieldDoc& words, T& out) {
   if (section.has(words.name.c_str())) read_value(section, words, out);
 }
 
 // A key that may be absent: its member then keeps its value.
 template <typename Owner, typename T>
-SchemaKey<Owner> optional_key(const FieldWords& words, T Owner::*member) {
+SchemaKey<Owner> optional_key(const FieldDoc& words, T Owner::*member) {
   return {words.name, [=](const YamlSection& section, Owner& owner) { read_optional(section, words, owner.*member); }};
 }
 

@@ -63,7 +63,7 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
 
 std::string describe(const YAML::Node& node) {
   if (!node.IsDefined() || node.IsNull()) return "nothing";
-  if (node.IsScalar()) return fmt::format("'{}'", shown(node.Scalar()));
+  if (node.IsScalar()) return fmt::format("'{}'", excerpt(node.Scalar()));
   return node.IsSequence() ? fmt::format("a list of {}", node.size()) : "a mapping";
 }
 
@@ -78,7 +78,7 @@ YamlSection::YamlSection(std::string file, const YAML::Node& node, std::string w
     if (std::find(names.begin(), names.end(), key) == names.end())
       fail(line_of(entry.first), unknown_name_message("key", key, names));
     if (!lines_.emplace(key, line_of(entry.first)).second)
-      fail(line_of(entry.first), fmt::format("expected each key once, found '{}' again", shown(key)));
+      fail(line_of(entry.first), fmt::format("expected each key once, found '{}' again", excerpt(key)));
   }
 }
 
@@ -88,7 +88,7 @@ int YamlSection::line(const char* key) const {
 }
 
 void YamlSection::fail(int line, const std::string& message) const {
-  throw InputError(fmt::format("{}:{}: {}: {}", file_, line, shown(where_), shown(message, kShownSentence)));
+  throw InputError(fmt::format("{}:{}: {}: {}", file_, line, excerpt(where_), excerpt(message, kShownSentence)));
 }
 
 YAML::Node YamlSection::node(const char* key) const {
@@ -141,7 +141,7 @@ std::vector<YAML::Node> YamlSection::items(const char* key) const {
   return {value.begin(), value.end()};
 }
 
-std::string field_node_text(const YamlSection& section, const FieldWords& words, const std::string& values) {
+std::string field_node_text(const YamlSection& section, const FieldDoc& words, const std::string& values) {
   const YAML::Node node = section.node(words.name.c_str());
   if (!node.IsScalar() || node.Scalar().empty())
     section.fail(section.line(words.name.c_str()),

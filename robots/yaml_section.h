@@ -65,7 +65,7 @@ std::string describe(const YAML::Node& node);
 // Tables of fields (core/field.h) read from YAML: strictly, with file, line, key, what was expected and what was found.
 
 // The value of a key that is there, as text. Throws InputError for a list, a mapping, nothing and "".
-std::string field_node_text(const YamlSection& section, const FieldWords& words, const std::string& values);
+std::string field_node_text(const YamlSection& section, const FieldDoc& words, const std::string& values);
 
 template <typename Owner>
 std::vector<const char*> field_keys(const FieldTable<Owner>& table) {

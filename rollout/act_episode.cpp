@@ -13,7 +13,7 @@ namespace duet {
 namespace {
 
 Episode episode_of(const RolloutSetup& setup) {
-  return {setup, episode_ticks(setup), episode_partner(setup).joints, setup.led_partner};
+  return {setup, episode_ticks(setup), episode_partner(setup).joints, setup.driven_partner};
 }
 
 PolicyReference reference_of(const RolloutSetup& setup, Policy& policy) {
@@ -88,7 +88,7 @@ void PolicyReference::begin(const RobotState& start) {
   scheduler_.reset({start.X_WB, start.q});
 }
 
-const Reference* PolicyReference::at(const Present& present) {
+const Reference* PolicyReference::at(const TickView& present) {
   look(present);
   if (present.tick % kTicksPerPlan == 0) plan(present.tick);
   if (policy_.faults().dead) return nullptr;
@@ -96,7 +96,7 @@ const Reference* PolicyReference::at(const Present& present) {
   return &scheduler_.at(present.tick);
 }
 
-void PolicyReference::look(const Present& present) {
+void PolicyReference::look(const TickView& present) {
   const bool own = options_.seen_partner.empty();
   const HumanJoints partner = own ? *present.partner : partner_joints(options_.seen_partner, present.tick);
   history_.add({perception_.seen(present.tick, partner), present.robot});

@@ -25,8 +25,8 @@ struct RolloutSetup : EpisodeConditions {
   // The partner that the policy sees in the place of the real one; frame 0 is tick 0, the last one stands. Empty:
   // the real one.
   PointTracks seen_partner;
-  // The partner's joints where the partner is led (Episode::led_partner); null: the partner follows the clip.
-  std::shared_ptr<const PointTracks> led_partner;
+  // The partner's joints where the partner is led (Episode::driven_partner); null: the partner follows the clip.
+  std::shared_ptr<const PointTracks> driven_partner;
   std::uint64_t seed = 0;
   bool foot_trace = false;                                    // whether the row is to have one
   int fuse_ticks = kTicksPerPlan;                             // SchedulerOptions
@@ -68,7 +68,7 @@ class PolicyReference final : public ReferenceSource {
   PolicyReference(Policy& policy, PolicyReferenceOptions options);
 
   void begin(const RobotState& start) override;
-  const Reference* at(const Present& present) override;
+  const Reference* at(const TickView& present) override;
   [[nodiscard]] std::string message() const override { return policy_.faults().message; }
   // Late plans, faults and times of this episode.
   void finish(Rollout& rollout) const;
@@ -78,7 +78,7 @@ class PolicyReference final : public ReferenceSource {
     int made;  // the tick of what the policy saw
     std::vector<Reference> plan;
   };
-  void look(const Present& present);
+  void look(const TickView& present);
   void plan(int tick);
   void deliver(int tick);
 

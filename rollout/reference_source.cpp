@@ -11,7 +11,7 @@
 
 namespace duet {
 
-const Reference* MotionReference::at(const Present& present) {
+const Reference* MotionReference::at(const TickView& present) {
   reference_ = motion_.reference(std::min(present.tick, motion_.frames() - 1));
   return &reference_;
 }
@@ -24,7 +24,7 @@ StreamReference::StreamReference(std::shared_ptr<const RobotModel> robot, const 
 
 void StreamReference::begin(const RobotState&) {}
 
-const Reference* StreamReference::at(const Present& present) {
+const Reference* StreamReference::at(const TickView& present) {
   if (present.tick > 0) stream_.advance(random_);
   return &stream_.reference();
 }

@@ -75,7 +75,7 @@ class ReferenceStream {
 };
 
 // The present, which is all that a source may look at. `partner` is null where nobody is there.
-struct Present {
+struct TickView {
   int tick = 0;
   const RobotState& robot;
   const HumanJoints* partner = nullptr;
@@ -87,7 +87,7 @@ class ReferenceSource {
   // Called before tick 0, where engine and controller stand in `start`.
   virtual void begin(const RobotState& start) = 0;
   // The reference of this tick; ticks come in order from 0. Valid until the next call. Null: there is none any more.
-  virtual const Reference* at(const Present& present) = 0;
+  virtual const Reference* at(const TickView& present) = 0;
   // Why there is no reference any more.
   [[nodiscard]] virtual std::string message() const { return ""; }
 };
@@ -97,7 +97,7 @@ class MotionReference final : public ReferenceSource {
  public:
   explicit MotionReference(const RobotMotion& motion) : motion_(motion) {}
   void begin(const RobotState&) override {}
-  const Reference* at(const Present& present) override;
+  const Reference* at(const TickView& present) override;
 
  private:
   const RobotMotion& motion_;
@@ -110,7 +110,7 @@ class StreamReference final : public ReferenceSource {
   // Throws what ReferenceStream throws.
   StreamReference(std::shared_ptr<const RobotModel> robot, const StreamOptions& options, std::uint64_t seed);
   void begin(const RobotState& start) override;
-  const Reference* at(const Present& present) override;
+  const Reference* at(const TickView& present) override;
   [[nodiscard]] const ReferenceStream& stream() const { return stream_; }
 
  private:

@@ -78,9 +78,9 @@ std::string describe(Outcome outcome, int tick, std::string_view engine) {
 // Steps between two looks at the clock within a control period: only a step far below the usual ones has so many.
 constexpr int kStepsPerLook = 64;
 
-class Simulated final : public World {
+class PhysicsWorld final : public World {
  public:
-  Simulated(const Episode& episode, Backend& backend, Controller& controller)
+  PhysicsWorld(const Episode& episode, Backend& backend, Controller& controller)
       : episode_(episode),
         backend_(backend),
         controller_(controller),
@@ -135,9 +135,9 @@ class Simulated final : public World {
 };
 
 // A world without physics: the robot is where its reference was a tick ago.
-class Moved final : public World {
+class KinematicWorld final : public World {
  public:
-  explicit Moved(const Episode& episode) : episode_(episode) {}
+  explicit KinematicWorld(const Episode& episode) : episode_(episode) {}
 
   void begin(const RobotState& start) override { follower_ = KinematicFollower(start); }
   [[nodiscard]] const RobotState& state() const override { return follower_.state(); }
@@ -211,12 +211,12 @@ Rollout roll_out(const Episode& episode, World& world, ReferenceSource& source, 
 }
 
 Rollout roll_out(const Episode& episode, Backend& backend, Controller& controller, ReferenceSource& source) {
-  Simulated world(episode, backend, controller);
+  PhysicsWorld world(episode, backend, controller);
   return roll_out(episode, world, source, backend.name());
 }
 
 Rollout play_back(const Episode& episode, ReferenceSource& source) {
-  Moved world(episode);
+  KinematicWorld world(episode);
   return roll_out(episode, world, source, "playback");
 }
 

@@ -47,9 +47,9 @@ struct Episode : EpisodeConditions {
   PointTracks partner;  // SMPL joints, frame 0 at tick 0, at least one frame more than ticks; empty: nobody
   // In the place of `partner` where somebody leads the other person too: the ReferenceSource's plan of a tick may
   // change the frames after it (and none before). Null: nobody does.
-  std::shared_ptr<const PointTracks> led_partner;
+  std::shared_ptr<const PointTracks> driven_partner;
 
-  [[nodiscard]] const PointTracks& other_person() const { return led_partner ? *led_partner : partner; }
+  [[nodiscard]] const PointTracks& other_person() const { return driven_partner ? *driven_partner : partner; }
 };
 
 struct Rollout {

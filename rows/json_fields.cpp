@@ -127,8 +127,8 @@ void JsonFields::refuse_unknown() const {
 
 void JsonFields::wrong_type(const std::string& key, std::string_view expected, const nlohmann::json& found) const {
   constexpr std::size_t kShownValue = 40;
-  throw InputError(fmt::format("{}: key '{}': expected {}, found {}", what_, shown(key), expected,
-                               shown(dumped(found), kShownValue)));
+  throw InputError(fmt::format("{}: key '{}': expected {}, found {}", what_, excerpt(key), expected,
+                               excerpt(dumped(found), kShownValue)));
 }
 
 double JsonFields::number_of(const std::string& key, const nlohmann::json& value, bool null_is_nan) const {

@@ -21,7 +21,7 @@ const std::array<std::string, 3> kRatingColumns = {"episode", "rater", "answer"}
 Answer answer_of(const std::string& word, const CsvReader& lines) {
   const std::vector<std::string> names(std::begin(kAnswerNames), std::end(kAnswerNames));
   const auto found = std::ranges::find(names, word);
-  if (found == names.end()) lines.fail(unknown_name_message("answer", shown(word), names));
+  if (found == names.end()) lines.fail(unknown_name_message("answer", excerpt(word), names));
   return static_cast<Answer>(found - names.begin());
 }
 
@@ -32,9 +32,10 @@ void add_line(const CsvReader& lines, Rater& rater) {
   if (fields[1].empty()) lines.fail("expected the rater's name, found nothing");
   if (rater.name.empty()) rater.name = fields[1];
   if (fields[1] != rater.name)
-    lines.fail(fmt::format("expected the answers of one rater, '{}', found '{}'", shown(rater.name), shown(fields[1])));
+    lines.fail(
+        fmt::format("expected the answers of one rater, '{}', found '{}'", excerpt(rater.name), excerpt(fields[1])));
   if (!rater.answers.try_emplace(fields[0], answer_of(fields[2], lines)).second)
-    lines.fail(fmt::format("episode '{}' is answered already", shown(fields[0])));
+    lines.fail(fmt::format("episode '{}' is answered already", excerpt(fields[0])));
 }
 
 Rater read_rater(const std::string& file, const Keys& known, const std::string& run) {
@@ -49,7 +50,7 @@ Rater read_rater(const std::string& file, const Keys& known, const std::string& 
     const std::string& key = lines.fields()[0];
     if (unknown.empty() && !known.contains(key))
       unknown =
-          fmt::format("'{}': line {}: expected an episode of '{}', found '{}'", file, lines.line(), run, shown(key));
+          fmt::format("'{}': line {}: expected an episode of '{}', found '{}'", file, lines.line(), run, excerpt(key));
   }
   if (rater.answers.empty()) throw InputError(fmt::format("'{}': expected a line for each answer, found none", file));
   if (std::ranges::none_of(rater.answers, [&](const auto& answer) { return known.contains(answer.first); }))
@@ -71,7 +72,7 @@ std::vector<Rater> read_ratings(std::span<const std::string> files, const std::v
     const auto same = std::ranges::find(raters, rater.name, &Rater::name);
     if (same != raters.end())
       throw InputError(fmt::format("'{}': expected another rater than in '{}', found '{}' again", file, same->file,
-                                   shown(rater.name)));
+                                   excerpt(rater.name)));
     raters.push_back(std::move(rater));
   }
   return raters;

@@ -185,7 +185,7 @@ class MemberScanner {
 // The text that a JSON value is, to `text`.
 void scan_text(std::string_view name, std::string_view value, std::string& text) {
   if (value.size() < 2 || value.front() != '"')
-    fail_scan(fmt::format("a text under the key '{}', found {}", name, shown(value)));
+    fail_scan(fmt::format("a text under the key '{}', found {}", name, excerpt(value)));
   if (value.find('\\') == std::string_view::npos) {
     text.assign(value.substr(1, value.size() - 2));
   } else {
@@ -197,7 +197,7 @@ int scanned_integer(std::string_view name, std::string_view value) {
   int number = 0;
   const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
   if (error != std::errc() || end != value.data() + value.size() || number < 0)
-    fail_scan(fmt::format("a whole number of at least 0 under the key '{}', found {}", name, shown(value)));
+    fail_scan(fmt::format("a whole number of at least 0 under the key '{}', found {}", name, excerpt(value)));
   return number;
 }
 
@@ -321,7 +321,7 @@ class RowReading {
       if (fields_[i].scanned && !found_.test(i)) fail_scan(fmt::format("the key '{}', found none", fields_[i].name));
     if (const std::string key = episode_key(scanned_.row); key != scanned_.row.key)
       throw InputError(fmt::format("key 'key': expected {}, of what the row says, found {}: the row was changed", key,
-                                   shown(scanned_.row.key)));
+                                   excerpt(scanned_.row.key)));
     print_.update(line_.substr(done_));
     scanned_.fingerprint = print_.bytes();
   }

@@ -108,7 +108,7 @@ Task task_of(const Recording& recording) {
 }
 
 // The verdict of the rule; where it cannot judge, a failure whose reason stands in the row's message.
-Verdict interaction_verdict(const Recording& recording, const ActSource& source, const Agent& human,
+Verdict interaction_verdict(const Recording& recording, const ScoringReference& source, const Agent& human,
                             const Agent& machine, EpisodeRow& row) {
   const Task task = task_of(recording);
   InteractionEvidence evidence{machine,
@@ -194,7 +194,7 @@ Verdict to_verdict(const DetectorResult& result, DetectorVersion version, Thresh
   return verdict;
 }
 
-ActSource act_source(const Recording& recording, const RolloutSetup& setup) {
+ScoringReference act_source(const Recording& recording, const RolloutSetup& setup) {
   const int begin = setup.reference.clip_frame + std::min(recording.phases.act_begin, recording.frames());
   const int end = setup.reference.clip_frame + std::min(recording.phases.act_end, recording.frames());
   const PairedMotion& clip = *setup.clip;
@@ -230,7 +230,7 @@ void score_walk(const Rollout& rollout, const SuiteReference& reference, const R
   if (recording.frames() >= kShortestScored) add_finite(controller_diagnostics(recording), row.metrics);
 }
 
-void score_recording(const Recording& recording, const ActSource& source, const ScoringRules& rules,
+void score_recording(const Recording& recording, const ScoringReference& source, const ScoringRules& rules,
                      const RobotModel& robot, EpisodeRow& row) {
   const Task task = task_of(recording);
   const Agent human = human_agent(recording.partner);
@@ -280,7 +280,7 @@ E parse_name(const Npz& npz, const std::string& key, const NameTable<E>& names) 
   const std::string found = npz.text(key);
   for (const auto& [name, value] : names)
     if (name == found) return value;
-  throw InputError(fmt::format("'{}': key '{}': unknown name '{}'", npz.name(), key, shown(found)));
+  throw InputError(fmt::format("'{}': key '{}': unknown name '{}'", npz.name(), key, excerpt(found)));
 }
 
 // Options that are not as by default.
@@ -321,8 +321,8 @@ ScoringRules get_rules(const Npz& npz) {
   return rules;
 }
 
-ActSource get_source(const Npz& npz, const Recording& recording) {
-  ActSource source;
+ScoringReference get_source(const Npz& npz, const Recording& recording) {
+  ScoringReference source;
   source.partner.joints = npz.tracks("act_partner", kSmplJoints);
   source.reactor.joints = npz.tracks("act_reactor", kSmplJoints);
   if (npz.contains("act_reshaped")) source.reshaped = npz.tracks("act_reshaped", -1);

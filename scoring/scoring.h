@@ -14,7 +14,7 @@
 namespace duet {
 
 // The people of the clip and the reshaped one, over the frames that the act had before the episode ended.
-ActSource act_source(const Recording& recording, const RolloutSetup& setup);
+ScoringReference act_source(const Recording& recording, const RolloutSetup& setup);
 
 // How a suite judges.
 struct ScoringRules {
@@ -26,7 +26,7 @@ struct ScoringRules {
 
 // Fills what follows from the motion alone: outcome, success, verdicts, traces, and into `row.metrics` onsets,
 // diagnostics and the 18. Success is false for every outcome but ok.
-void score_recording(const Recording& recording, const ActSource& source, const ScoringRules& rules,
+void score_recording(const Recording& recording, const ScoringReference& source, const ScoringRules& rules,
                      const RobotModel& robot, EpisodeRow& row);
 
 // The same of a rollout, and what was measured while it ran: contacts, forces, faults, times of plans, state hash.
@@ -65,7 +65,7 @@ NamedNumbers finite_of(const NamedNumbers& values);
 struct KeptEpisode {
   EpisodeRow row;
   ScoringRules rules;
-  ActSource source;
+  ScoringReference source;
 };
 
 struct EpisodeRecording {

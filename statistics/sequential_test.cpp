@@ -82,26 +82,26 @@ Interval SequentialTest::interval(double alpha) const {
   return {.low = low, .high = high};
 }
 
-std::string_view to_string(PairVerdict verdict) {
+std::string_view to_string(SequentialDecision verdict) {
   switch (verdict) {
-    case PairVerdict::kUndecided:
+    case SequentialDecision::kUndecided:
       break;
-    case PairVerdict::kBetter:
+    case SequentialDecision::kBetter:
       return "better";
-    case PairVerdict::kWorse:
+    case SequentialDecision::kWorse:
       return "worse";
-    case PairVerdict::kSame:
+    case SequentialDecision::kSame:
       return "same within the margin";
   }
   return "undecided";
 }
 
-PairVerdict verdict_of(const Interval& interval, double margin) {
+SequentialDecision verdict_of(const Interval& interval, double margin) {
   require(margin > 0.0 && margin < 1.0, "margin: expected a number in (0, 1), found {}", margin);
-  if (interval.low > -margin && interval.high < margin) return PairVerdict::kSame;
-  if (interval.low > 0.0) return PairVerdict::kBetter;
-  if (interval.high < 0.0) return PairVerdict::kWorse;
-  return PairVerdict::kUndecided;
+  if (interval.low > -margin && interval.high < margin) return SequentialDecision::kSame;
+  if (interval.low > 0.0) return SequentialDecision::kBetter;
+  if (interval.high < 0.0) return SequentialDecision::kWorse;
+  return SequentialDecision::kUndecided;
 }
 
 }  // namespace duet

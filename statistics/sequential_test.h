@@ -43,11 +43,11 @@ class SequentialTest {
 };
 
 // The verdict on A against B.
-enum class PairVerdict { kUndecided, kBetter, kWorse, kSame };
-std::string_view to_string(PairVerdict verdict);  // "undecided", "better", "worse", "same within the margin"
+enum class SequentialDecision { kUndecided, kBetter, kWorse, kSame };
+std::string_view to_string(SequentialDecision verdict);  // "undecided", "better", "worse", "same within the margin"
 
 // `interval` of A minus B: the same where it lies inside (-margin, margin), even where it leaves out 0; else better or
 // worse where it leaves out 0. margin in (0, 1); throws std::invalid_argument.
-PairVerdict verdict_of(const Interval& interval, double margin);
+SequentialDecision verdict_of(const Interval& interval, double margin);
 
 }  // namespace duet

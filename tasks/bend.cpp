@@ -19,7 +19,7 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kHeadRoom = 0.38;  // between the two heads at the lowest [m]
 
 Eigen::Vector3d head_from_root(const Body& body, const Lean& lean) {
-  Figure figure;
+  PosedBody figure;
   pose_torso(body, standing_torso(body, {}, lean, body.stand_height), figure);
   return figure.p.col(kHead) - figure.p.col(kPelvis);
 }
@@ -53,7 +53,7 @@ std::vector<Bow> plan_bows(double begin, double end, double down, double up, dou
   return bows;
 }
 
-Layout bend_layout(const Cast& cast, Draws& draws) {
+Layout bend_layout(const Participants& cast, Draws& draws) {
   const double depth = draws.styled("inclination", cast.style, 33.0 * kDegree, 57.0 * kDegree);
   const double differs = draws.uniform("b.deeper", -4.0 * kDegree, 4.0 * kDegree);
   Layout layout;

@@ -52,7 +52,7 @@ Bump plan_bump(const Scene& scene, Draws& draws) {
   return bump;
 }
 
-Layout fist_bump_layout(const Cast& cast, Draws& draws) {
+Layout fist_bump_layout(const Participants& cast, Draws& draws) {
   const double stature = 0.5 * (cast.body[0].height + cast.body[1].height);
   const double share = draws.uniform("target.share", 0.55, 0.70);
   const double z = cast.target_height.value_or(std::clamp(share * stature, kLowestTouch, kHighestTouch));

@@ -57,7 +57,7 @@ Hold blown(double height) {
   };
 }
 
-Layout fly_kiss_layout(const Cast& cast, Draws& draws) {
+Layout fly_kiss_layout(const Participants& cast, Draws& draws) {
   Layout layout;
   layout.distance = std::min(draws.uniform("act.distance", 1.2, 2.1), cast.farthest);
   for (Lean& lean : layout.lean) lean.forward = draws.styled("lean", cast.style, 0.02, 0.12);

@@ -35,7 +35,7 @@ constexpr RecordedManner kRecordedHandshake = {.tempo = {0.95, 1.25, 1.55},
                                                .before = {0.3, 0.65, 1.1},
                                                .after = {0.33, 0.58, 0.7}};
 
-std::vector<Burst> shake_bouts(double begin, double end, const Manner& manner, Draws& draws) {
+std::vector<Burst> shake_bouts(double begin, double end, const MotionStyle& manner, Draws& draws) {
   const double rate = draws.uniform("shake.rate_hz", 1.6, 2.4) / std::max(1.0, 0.75 * manner.tempo);
   Random random = draws.stream("shake.bouts");
   std::vector<Burst> bouts;
@@ -50,7 +50,7 @@ std::vector<Burst> shake_bouts(double begin, double end, const Manner& manner, D
   return bouts;
 }
 
-Layout handshake_layout(const Cast& cast, Draws& draws) {
+Layout handshake_layout(const Participants& cast, Draws& draws) {
   const double stature = 0.5 * (cast.body[0].height + cast.body[1].height);
   const double z = cast.target_height ? *cast.target_height : stature * draws.uniform("target.share", 0.565, 0.62);
   draws.record("target_height", z);

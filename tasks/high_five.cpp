@@ -55,7 +55,7 @@ Hold ready_near(const Eigen::Vector3d& point) {
   };
 }
 
-Layout high_five_layout(const Cast& cast, Draws& draws) {
+Layout high_five_layout(const Participants& cast, Draws& draws) {
   const double stature = 0.5 * (cast.body[0].height + cast.body[1].height);
   const double shorter = std::min(cast.body[0].height, cast.body[1].height);
   const double high = draws.styled("target.share", cast.style, 0.86, 1.0);

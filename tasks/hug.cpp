@@ -45,21 +45,21 @@ struct Spot {
   bool over = false;
 };
 
-bool goes_over(const Cast& cast, int person, int arm) {
+bool goes_over(const Participants& cast, int person, int arm) {
   const double taller = cast.body[person].height - cast.body[1 - person].height;
   if (std::abs(taller) > kStatureGap) return taller > 0.0;
   return arm == cast.side;
 }
 
-Figure embracing(const Cast& cast, const Layout& layout, int person) {
-  Figure figure;
+PosedBody embracing(const Participants& cast, const Layout& layout, int person) {
+  PosedBody figure;
   const Body& body = cast.body[person];
   pose_torso(body, standing_torso(body, {}, layout.lean[person], body.stand_height), figure);
   return figure;
 }
 
-Spot spot_for(const Cast& cast, const Layout& layout, int person, int arm, Draws& draws) {
-  const Figure own = embracing(cast, layout, person), partner = embracing(cast, layout, 1 - person);
+Spot spot_for(const Participants& cast, const Layout& layout, int person, int arm, Draws& draws) {
+  const PosedBody own = embracing(cast, layout, person), partner = embracing(cast, layout, 1 - person);
   Spot spot;
   spot.over = goes_over(cast, person, arm);
   const std::string name = fmt::format("{}{}.spot", kWho[person], arm == 0 ? "left" : "right");
@@ -104,7 +104,7 @@ std::vector<Burst> plan_pats(const std::string& who, double begin, double end, D
 constexpr double kMostHugLean = 0.45;  // of a trunk [rad]
 
 // They stand at `distance` (not so near that their trunks would be in each other) and lean into the embrace.
-void stand_off(const Cast& cast, double distance, Layout& layout) {
+void stand_off(const Participants& cast, double distance, Layout& layout) {
   if (distance <= layout.distance) return;
   const auto between = [&] {
     double gap = distance;
@@ -116,7 +116,7 @@ void stand_off(const Cast& cast, double distance, Layout& layout) {
   layout.distance = distance;
 }
 
-Layout hug_layout(const Cast& cast, Draws& draws) {
+Layout hug_layout(const Participants& cast, Draws& draws) {
   Layout layout;
   const double lean = draws.styled("lean", cast.style, 0.08, 0.17);
   const double gap = draws.uniform("gap", 0.01, 0.05);

@@ -43,7 +43,7 @@ Hold waving_hand(const Waving& waving) {
   };
 }
 
-Layout wave_layout(const Cast& cast, Draws& draws) {
+Layout wave_layout(const Participants& cast, Draws& draws) {
   Layout layout;
   layout.distance = std::min(draws.uniform("act.distance", 1.2, 2.2), cast.farthest);
   stand_at_bearings(cast, layout);

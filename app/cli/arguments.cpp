@@ -16,9 +16,9 @@
 
 namespace duet::cli {
 
-void add_field(CLI::App& command, const FieldWords& words, const std::string& values, const std::string& fallback,
+void add_field(CLI::App& command, const FieldDoc& words, const std::string& values, const std::string& fallback,
                const std::function<std::string(const std::string&)>& set, bool many) {
-  FieldWords flag = words;
+  FieldDoc flag = words;
   flag.name = "--" + words.name;
   std::replace(flag.name.begin(), flag.name.end(), '_', '-');
   const auto read = [flag, set](const std::vector<std::string>& texts) {
@@ -52,7 +52,7 @@ void set_network(Suite& suite, const std::string& actor, const std::string& path
 
 }  // namespace
 
-void add_filters(CLI::App& command, RunPart& part) {
+void add_filters(CLI::App& command, EpisodeFilter& part) {
   command.add_option("--engines", part.engines, "only these")->delimiter(',');
   command.add_option("--controllers", part.controllers, "only these")->delimiter(',');
   command.add_option("--policies", part.policies, "only these (the null arm always runs)")->delimiter(',');

@@ -16,7 +16,7 @@ namespace duet::cli {
 
 // The options --NAME of a table of fields ('_' as '-'; `output` also as -o), which set `owner`: it outlives the
 // command. `many`: the field that takes several values, joined by spaces.
-void add_field(CLI::App& command, const FieldWords& words, const std::string& values, const std::string& fallback,
+void add_field(CLI::App& command, const FieldDoc& words, const std::string& values, const std::string& fallback,
                const std::function<std::string(const std::string&)>& set, bool many);
 template <typename Owner>
 void add_fields(CLI::App& command, const FieldTable<Owner>& table, Owner& owner, const std::string& many = "") {
@@ -38,7 +38,7 @@ struct SuiteArguments {
 void add_suite_options(CLI::App& command, SuiteArguments& arguments);
 
 // --engines, --controllers, --policies, --tasks, --perturbations.
-void add_filters(CLI::App& command, RunPart& part);
+void add_filters(CLI::App& command, EpisodeFilter& part);
 
 // Throws InputError (the suite, its clips, its limits) and std::invalid_argument (an option).
 Suite suite_of(const SuiteArguments& arguments);

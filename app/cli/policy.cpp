@@ -4,7 +4,7 @@
 #include "duet/app/command.h"
 #include "duet/app/policy_check.h"
 #include "duet/core/require.h"
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "duet/policies/catalogue/registry.h"
 
 namespace duet::cli {
@@ -25,7 +25,7 @@ nlohmann::json json_of(const PolicyCheck& check) {
           {{"name", channel.name}, {"size", channel.size}, {"low", channel.low}, {"high", channel.high}});
     inputs.push_back({{"name", input.name}, {"frames", input.frames}, {"channels", channels}});
   }
-  return {{"policy", shown(check.info.name)},
+  return {{"policy", excerpt(check.info.name)},
           {"clip", check.clip},
           {"shown", inputs},
           {"asked_for", check.output},
@@ -48,8 +48,8 @@ void run_check(Session& session, const CheckArguments& arguments) {
   print(session, describe(check), json_of(check));
   if (check.faults.any() || check.plan.empty())
     throw InputError(check.faults.message.empty()
-                         ? fmt::format("policy '{}': expected a plan, found none", shown(check.info.name))
-                         : shown(check.faults.message, 400));
+                         ? fmt::format("policy '{}': expected a plan, found none", excerpt(check.info.name))
+                         : excerpt(check.faults.message, 400));
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ void add_row_notes(const std::vector<EpisodeRow>& rows, std::vector<std::string>
   notes.push_back(repeats);
 }
 
-std::vector<std::string> with_suite(const BoardSuite& suite, std::vector<std::string> notes) {
+std::vector<std::string> with_suite(const RankingSuite& suite, std::vector<std::string> notes) {
   if (!suite.warning.empty()) notes.insert(notes.begin(), suite.warning);
   return notes;
 }

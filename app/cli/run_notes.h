@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "duet/app/command.h"
-#include "duet/report/ranking/board.h"
+#include "duet/report/ranking/ranking.h"
 #include "duet/rows/folder/run_directory.h"
 
 namespace duet::cli {
@@ -21,7 +21,7 @@ std::vector<std::string> completeness_notes(const std::vector<std::string>& path
 void add_row_notes(const std::vector<EpisodeRow>& rows, std::vector<std::string>& notes);
 
 // The same after the warning that the suite only bears the name of one that ships, where it does.
-std::vector<std::string> with_suite(const BoardSuite& suite, std::vector<std::string> notes);
+std::vector<std::string> with_suite(const RankingSuite& suite, std::vector<std::string> notes);
 
 // A file's text with the notes, as its format has them (md, csv, tex, svg; json: before its own in the key "notes");
 // unchanged without any.

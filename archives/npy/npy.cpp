@@ -279,8 +279,8 @@ NpyType parse_type(std::string_view text, bool objects) {
   if (objects && text == "|O") return {'O', false, sizeof(void*)};
   const auto refuse = [&]() -> InputError {
     if (text.find('O') != std::string_view::npos)
-      return InputError(fmt::format("object arrays ('{}') hold Python code and are not read", shown(text)));
-    return InputError(fmt::format("expected type f2, f4, f8, i1..i8, u1..u8, b1, U or S, found '{}'", shown(text)));
+      return InputError(fmt::format("object arrays ('{}') hold Python code and are not read", excerpt(text)));
+    return InputError(fmt::format("expected type f2, f4, f8, i1..i8, u1..u8, b1, U or S, found '{}'", excerpt(text)));
   };
   if (text.size() < 3 || std::string_view("<>|=").find(text[0]) == std::string_view::npos) throw refuse();
   NpyType type{text[1], text[0] == '>', 0};
@@ -308,7 +308,7 @@ class HeaderParser {
     expect('{');
     while (!accept('}')) {
       const std::string_view key = quoted();
-      if (!seen.insert(key).second) throw InputError(fmt::format("header names '{}' twice", shown(key)));
+      if (!seen.insert(key).second) throw InputError(fmt::format("header names '{}' twice", excerpt(key)));
       expect(':');
       parse_value(key);
       if (accept('}')) break;
@@ -330,7 +330,7 @@ class HeaderParser {
     } else if (key == "shape") {
       header_.shape = sizes();
     } else {
-      throw InputError(fmt::format("header has the unknown key '{}'", shown(key)));
+      throw InputError(fmt::format("header has the unknown key '{}'", excerpt(key)));
     }
   }
 

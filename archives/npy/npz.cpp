@@ -57,7 +57,7 @@ std::size_t bytes_of(const NpyArray& array) {
 }
 
 [[noreturn]] void refuse(const Npz& npz, const std::string& key, const std::string& problem) {
-  throw InputError(fmt::format("'{}': array '{}': {}", npz.name(), shown(key), problem));
+  throw InputError(fmt::format("'{}': array '{}': {}", npz.name(), excerpt(key), problem));
 }
 
 const NpyArray& shaped_array(const Npz& npz, const std::string& key, const std::vector<long>& shape) {
@@ -98,7 +98,7 @@ Npz Npz::load(const std::string& path, const std::vector<std::string>& only) {
 
 void Npz::take(const std::string& entry, const std::string& content, std::size_t& held) {
   if (!entry.ends_with(kSuffix) || entry.size() == kSuffix.size())
-    throw InputError(fmt::format("'{}': expected entries named '<key>.npy', found '{}'", name_, shown(entry)));
+    throw InputError(fmt::format("'{}': expected entries named '<key>.npy', found '{}'", name_, excerpt(entry)));
   const std::string key = entry.substr(0, entry.size() - kSuffix.size());
   try {
     const auto [added, is_new] = arrays_.emplace(key, parse_npy(content));
@@ -165,7 +165,7 @@ const NpyArray& Npz::array(const std::string& key) const {
   std::vector<std::string> names = keys();
   names.insert(names.end(), left_out_.begin(), left_out_.end());
   throw InputError(fmt::format("'{}': no array '{}'. It has: {}", name_, key,
-                               shown(fmt::format("{}", fmt::join(names, ", ")), kShownKeys)));
+                               excerpt(fmt::format("{}", fmt::join(names, ", ")), kShownKeys)));
 }
 
 std::vector<double> Npz::numbers(const std::string& key, const std::vector<long>& shape) const {
@@ -195,7 +195,7 @@ double Npz::number_or_text(const std::string& key) const {
   if (!std::holds_alternative<std::vector<std::string>>(array(key).values)) return number(key);
   const std::string words = text(key);
   if (const std::optional<double> value = parse_number(words)) return *value;
-  refuse(*this, key, fmt::format("expected a number, found '{}'", shown(words)));
+  refuse(*this, key, fmt::format("expected a number, found '{}'", excerpt(words)));
 }
 
 std::int64_t Npz::integer(const std::string& key) const { return integers(key, scalar_shape(*this, key)).front(); }

@@ -36,7 +36,7 @@ const PickleNode* PickleDict::find(const std::string& key) const {
 const PickleNode& PickleDict::get(const std::string& key) const {
   if (const PickleNode* node = find(key)) return *node;
   throw InputError(fmt::format("'{}': missing key '{}'; keys found: {}", pickle_.name, key,
-                               shown(fmt::format("{}", fmt::join(keys(), ", ")), kShownSentence)));
+                               excerpt(fmt::format("{}", fmt::join(keys(), ", ")), kShownSentence)));
 }
 
 std::vector<std::string> PickleDict::keys() const {
@@ -50,7 +50,7 @@ void PickleDict::add(const PickleNode& key, int value) {
     pickle_.fail(key.offset, fmt::format("expected a string as key, found {}", to_string(key.kind)));
   const std::string name(key.text);
   if (!values_.emplace(name, value).second)
-    pickle_.fail(key.offset, fmt::format("key '{}' is there twice", shown(name)));
+    pickle_.fail(key.offset, fmt::format("key '{}' is there twice", excerpt(name)));
 }
 
 PickleTable pickle_table(const Pickle& pickle, const PickleNode& node, const std::string& key, std::size_t frames,
@@ -156,7 +156,7 @@ void read_more(const Pickle& pickle, const PickleDict& dict, PickledMotion& resu
   }
   if (!others.empty())
     result.verdict.push_back(std::string(kLeftOutKeys) + "keys that are none of the format's: " +
-                             shown(fmt::format("{}", fmt::join(others, ", ")), kShownSentence));
+                             excerpt(fmt::format("{}", fmt::join(others, ", ")), kShownSentence));
 }
 
 }  // namespace

@@ -225,7 +225,7 @@ PickleNumbers pickle_numbers(const Pickle& pickle, const PickleNode& node, const
 double pickle_number(const Pickle& pickle, const PickleNode& node, const std::string& what) {
   if (node.kind == PickleKind::kText) {
     if (const std::optional<double> number = parse_number(node.text)) return *number;
-    pickle.fail(node.offset, fmt::format("{}: expected a number, found '{}'", what, shown(node.text)));
+    pickle.fail(node.offset, fmt::format("{}: expected a number, found '{}'", what, excerpt(node.text)));
   }
   const PickleNumbers numbers = pickle_numbers(pickle, node, what);
   if (numbers.values.size() != 1)

@@ -338,7 +338,7 @@ class PickleMachine {
       fail("arguments of an object: expected none");
     const PickleNode& type = expect(pop(), PickleKind::kCallable, "class of an object");
     if (type.callable != PickleCallable::kJoblibArray && type.callable != PickleCallable::kSparse)
-      fail(fmt::format("an object of '{}' is refused: expected an array", shown(type.text)));
+      fail(fmt::format("an object of '{}' is refused: expected an array", excerpt(type.text)));
     push({.kind = PickleKind::kObject, .text = type.text, .callable = type.callable});
     return true;
   }

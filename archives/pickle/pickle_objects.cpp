@@ -45,7 +45,8 @@ std::size_t item_bytes(const Pickle& pickle, std::size_t offset, std::string_vie
   constexpr std::string_view kKinds = "biufcSUmM";
   const bool known = !type.empty() && kKinds.find(type[0]) != std::string_view::npos && error == std::errc() &&
                      end == digits.data() + digits.size() && size <= 1 << 16;
-  if (!known) pickle.fail(offset, fmt::format("joblib array: expected numbers or texts, found type '{}'", shown(type)));
+  if (!known)
+    pickle.fail(offset, fmt::format("joblib array: expected numbers or texts, found type '{}'", excerpt(type)));
   return type[0] == 'U' ? 4 * size : size;
 }
 
@@ -71,7 +72,7 @@ PickleNode joblib_array(const Pickle& pickle, std::size_t offset, const PickleNo
   const PickleNode& order = member(pickle, offset, wrapper, "order");
   if (order.kind != PickleKind::kText || (order.text != "C" && order.text != "F"))
     pickle.fail(offset, fmt::format("memory order of a joblib array: expected 'C' or 'F', found {} '{}'",
-                                    to_string(order.kind), shown(order.text)));
+                                    to_string(order.kind), excerpt(order.text)));
   array.fortran = order.text == "F";
   const PickleNode& dtype = member(pickle, offset, wrapper, "dtype");
   if (dtype.kind != PickleKind::kDtype)
@@ -96,7 +97,7 @@ PickleNode empty_dict(const Pickle& pickle, std::size_t offset, const std::vecto
   for (const int argument : arguments) {
     const PickleNode& type = expect_kind(pickle, offset, argument, PickleKind::kCallable, "default of a dict");
     if (type.callable != PickleCallable::kBuiltinType)
-      pickle.fail(offset, fmt::format("default of a dict: '{}' is refused", shown(type.text)));
+      pickle.fail(offset, fmt::format("default of a dict: '{}' is refused", excerpt(type.text)));
   }
   return {.kind = PickleKind::kDict};
 }
@@ -110,7 +111,7 @@ PickleNode torch_storage(const Pickle& pickle, std::size_t offset, int identity)
   for (const StorageType& known : kStorageTypes)
     if (type.callable == PickleCallable::kTorchStorage && known.name == type.text)
       return {.kind = PickleKind::kStorage, .integer = count.integer, .text = known.type, .data = items[2]};
-  pickle.fail(offset, fmt::format("type of a torch storage: '{}' is refused", shown(type.text)));
+  pickle.fail(offset, fmt::format("type of a torch storage: '{}' is refused", excerpt(type.text)));
 }
 
 PickleNode torch_tensor(const Pickle& pickle, std::size_t offset, const std::vector<int>& arguments) {
@@ -211,7 +212,7 @@ class Objects {
     expect(arguments[1], PickleKind::kDtype, "type of an array");
     const std::string_view order = expect(arguments[3], PickleKind::kText, "memory order of an array").text;
     if (order != "C" && order != "F")
-      fail(fmt::format("memory order of an array: expected C or F, found '{}'", shown(order)));
+      fail(fmt::format("memory order of an array: expected C or F, found '{}'", excerpt(order)));
     return {.kind = PickleKind::kArray,
             .built = true,
             .fortran = order == "F",
@@ -224,7 +225,7 @@ class Objects {
   [[nodiscard]] PickleNode encode(const std::vector<int>& arguments) const {
     check_count(arguments, 2, 2, "_codecs.encode");
     const std::string_view codec = expect(arguments[1], PickleKind::kText, "codec").text;
-    if (codec != "latin1") fail(fmt::format("codec: expected 'latin1', found '{}'", shown(codec)));
+    if (codec != "latin1") fail(fmt::format("codec: expected 'latin1', found '{}'", excerpt(codec)));
     return {.kind = PickleKind::kBytes,
             .text = expect(arguments[0], PickleKind::kText, "encoded bytes").text,
             .latin1_text = true};
@@ -235,7 +236,7 @@ class Objects {
     check_count(state, 8, 9, "state of numpy.dtype");
     const std::string_view order = expect(state[1], PickleKind::kText, "byte order").text;
     if (order != "<" && order != ">" && order != "|")
-      fail(fmt::format("byte order: expected '<', '>' or '|', found '{}'", shown(order)));
+      fail(fmt::format("byte order: expected '<', '>' or '|', found '{}'", excerpt(order)));
     for (const int part : {2, 3, 4}) expect(state[part], PickleKind::kNone, "fields of a structured dtype");
     dtype.byte_order = order[0];
   }
@@ -292,7 +293,7 @@ PickleCallable find_callable(const Pickle& pickle, std::size_t offset, std::stri
       return known.callable;
   pickle.fail(offset, fmt::format("'{}.{}' is refused: expected only what NumPy arrays need (numpy.ndarray, "
                                   "numpy.dtype, their reconstruction); nothing in the file is executed",
-                                  shown(module), shown(name)));
+                                  excerpt(module), excerpt(name)));
 }
 
 PickleNode reduced(const Pickle& pickle, std::size_t offset, PickleCallable callable,

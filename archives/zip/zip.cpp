@@ -94,7 +94,7 @@ std::vector<Claim> claims(zip_t* archive, const std::string& name, const ZipLimi
     Claim claim = claim_of(archive, index, name);
     if (wanted && !wanted(claim.entry)) continue;
     if (claim.bytes > limits.entry_bytes)
-      fail(name, fmt::format("entry '{}': above {} bytes", shown(claim.entry), limits.entry_bytes));
+      fail(name, fmt::format("entry '{}': above {} bytes", excerpt(claim.entry), limits.entry_bytes));
     claims.push_back(std::move(claim));
     total += claims.back().bytes;  // no overflow: at most 10^4 entries, each below its limit
     if (total > limits.total_bytes) refuse_total(name, limits);
@@ -105,7 +105,7 @@ std::vector<Claim> claims(zip_t* archive, const std::string& name, const ZipLimi
 void add_entry(zip_t* archive, const ZipEntry& entry, ZipMethod method) {
   const auto check = [&](bool ok) {
     if (!ok)
-      throw InputError(fmt::format("cannot put '{}' in an archive: {}", shown(entry.name), zip_strerror(archive)));
+      throw InputError(fmt::format("cannot put '{}' in an archive: {}", excerpt(entry.name), zip_strerror(archive)));
   };
   Source source(zip_source_buffer(archive, entry.content.data(), entry.content.size(), 0));
   check(source != nullptr);
@@ -150,7 +150,7 @@ void read_zip(std::string_view bytes, const std::string& name, const ZipLimits& 
   const Archive archive = open_archive(bytes, name);
   std::size_t total = 0;
   for (const Claim& claim : claims(archive.get(), name, limits, wanted)) {
-    const std::string what = fmt::format("'{}': entry '{}'", name, shown(claim.entry));
+    const std::string what = fmt::format("'{}': entry '{}'", name, excerpt(claim.entry));
     const std::string content = read_entry(archive.get(), claim.index, what, limits.entry_bytes);
     total += content.size();
     if (total > limits.total_bytes) refuse_total(name, limits);

@@ -42,7 +42,7 @@ BulletWorld::BulletWorld(const Scene& scene, std::size_t contacts)
 bool BulletWorld::begin(const RobotState& state, const JointCommand& command) { return law_.begin(state, command); }
 
 // The law's limit is taken with the contact forces of the step: where a torque passes it, the step is made again.
-void BulletWorld::step(std::span<const ContactPoint> points, const LinkPushes* pushes, RobotState& state,
+void BulletWorld::step(std::span<const ContactPoint> points, const ExternalForces* pushes, RobotState& state,
                        Eigen::VectorXd& torques) {
   Q_.setZero();
   if (pushes != nullptr && pushes->any()) add_pushes(*pushes);
@@ -71,9 +71,9 @@ void BulletWorld::solve(const Eigen::VectorXd& q) {
   a_ = (articulation_.velocity() - before_) / dt_;
 }
 
-void BulletWorld::add_pushes(const LinkPushes& pushes) {
+void BulletWorld::add_pushes(const ExternalForces& pushes) {
   for (int link = 0; link <= robot_->dof(); ++link) {
-    const LinkPushes::Push& push = pushes.all()[link];
+    const ExternalForces::Push& push = pushes.all()[link];
     if (push.f_W.isZero(0.0)) continue;
     const Eigen::Vector3d p_W = kinematics().p_WL(link) + kinematics().R_WL(link) * push.p_L;
     Q_.head<3>() += push.f_W;

@@ -26,11 +26,11 @@ class BulletWorld {
   // Law and poses of `state`, which is the articulation's. False where the state has diverged.
   [[nodiscard]] bool begin(const RobotState& state, const JointCommand& command);
   // From begin()'s state to the one after it, and the torques of the law. `pushes` may be null.
-  void step(std::span<const ContactPoint> points, const LinkPushes* pushes, RobotState& state,
+  void step(std::span<const ContactPoint> points, const ExternalForces* pushes, RobotState& state,
             Eigen::VectorXd& torques);
 
  private:
-  void add_pushes(const LinkPushes& pushes);
+  void add_pushes(const ExternalForces& pushes);
   void solve(const Eigen::VectorXd& q);
 
   double dt_;

@@ -72,10 +72,10 @@ const ConformanceScene& find_scene(std::string_view name);
 SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, const Settings& settings);
 
 // kDeviation: outside its tolerance, inside the bound that its engine's module gives it.
-enum class Verdict { kPass, kFail, kDeviation };
-std::string_view to_string(Verdict verdict);  // "pass", "FAIL", "deviation"
+enum class CheckStatus { kPass, kFail, kDeviation };
+std::string_view to_string(CheckStatus verdict);  // "pass", "FAIL", "deviation"
 
-Verdict verdict_on(const std::string& engine, const Measurement& measurement);
+CheckStatus status_of(const std::string& engine, const Measurement& measurement);
 
 struct SceneReport {
   std::string name;

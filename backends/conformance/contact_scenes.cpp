@@ -28,7 +28,7 @@ struct Bounce {
 
 // The linearly implicit step on one unilateral spring and damper, which every engine has to make of a skin:
 // f = -K r - (D + dt K) v+, not negative.
-Bounce discrete_bounce(const Skin& skin, double dt) {
+Bounce discrete_bounce(const ContactCompliance& skin, double dt) {
   Bounce bounce;
   double r = kGap, v = -kImpactSpeed;
   for (int i = 0; i < steps_in(0.2, dt); ++i) {
@@ -45,7 +45,7 @@ Bounce discrete_bounce(const Skin& skin, double dt) {
   return bounce;
 }
 
-Bounce bounce_in(const Trial& trial, const Skin& skin, double dt) {
+Bounce bounce_in(const Trial& trial, const ContactCompliance& skin, double dt) {
   Scene scene = trial.scene(ball(kMass, kRadius), dt);
   scene.gravity.setZero();
   scene.partner = PartnerMode::kSolid;
@@ -80,7 +80,7 @@ Bounce bounce_in(const Trial& trial, const Skin& skin, double dt) {
 }
 
 // Restitution of a unilateral spring and damper (no pull): Schwager and Poeschel, Granular Matter 9 (2007), eq. 21.
-double restitution(const Skin& skin) {
+double restitution(const ContactCompliance& skin) {
   const double beta = 0.5 * skin.damping / kMass;
   const double omega = std::sqrt(skin.stiffness / kMass - beta * beta);
   return std::exp(-beta / omega * (std::numbers::pi - std::atan2(2.0 * beta * omega, omega * omega - beta * beta)));
@@ -91,7 +91,7 @@ double restitution(const Skin& skin) {
 void measure_skin_bounce(Trial& trial) {
   const double natural = std::sqrt(kSkinStiffness / kMass);
   for (const double damping : {0.0, 200.0}) {
-    const Skin skin{.stiffness = kSkinStiffness, .damping = damping};
+    const ContactCompliance skin{.stiffness = kSkinStiffness, .damping = damping};
     const auto name = [&](const char* what) {
       return fmt::format("{} skin: {}", damping == 0.0 ? "undamped" : "damped", what);
     };

@@ -106,25 +106,25 @@ SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, con
   return run;
 }
 
-std::string_view to_string(Verdict verdict) {
+std::string_view to_string(CheckStatus verdict) {
   switch (verdict) {
-    case Verdict::kPass:
+    case CheckStatus::kPass:
       return "pass";
-    case Verdict::kDeviation:
+    case CheckStatus::kDeviation:
       return "deviation";
-    case Verdict::kFail:
+    case CheckStatus::kFail:
       break;
   }
   return "FAIL";
 }
 
-Verdict verdict_on(const std::string& engine, const Measurement& measurement) {
+CheckStatus status_of(const std::string& engine, const Measurement& measurement) {
   const double error = error_of(measurement);
-  if (error <= measurement.tolerance) return Verdict::kPass;  // false for NaN
+  if (error <= measurement.tolerance) return CheckStatus::kPass;  // false for NaN
   const EngineDeviation* known = find_deviation(engine, measurement.scene, measurement.quantity);
-  if (known == nullptr) return Verdict::kFail;
+  if (known == nullptr) return CheckStatus::kFail;
   const double bound = measurement.of_stand_in ? known->bound : std::numeric_limits<double>::max();
-  return error <= bound ? Verdict::kDeviation : Verdict::kFail;
+  return error <= bound ? CheckStatus::kDeviation : CheckStatus::kFail;
 }
 
 EngineReport run_suite(const std::string& engine, const Settings& settings, std::span<const std::string> names) {
@@ -159,8 +159,8 @@ void agree(std::span<EngineReport> reports) {
 Tally tally(const EngineReport& report) {
   Tally tally;
   for_each_measurement(report, [&](const Measurement& measurement) {
-    const Verdict verdict = verdict_on(report.engine, measurement);
-    ++(verdict == Verdict::kPass ? tally.passed : verdict == Verdict::kFail ? tally.failed : tally.deviations);
+    const CheckStatus verdict = status_of(report.engine, measurement);
+    ++(verdict == CheckStatus::kPass ? tally.passed : verdict == CheckStatus::kFail ? tally.failed : tally.deviations);
   });
   return tally;
 }
@@ -174,7 +174,7 @@ std::vector<std::string> stale_deviations(const EngineReport& report) {
     for_each_measurement(report, [&](const Measurement& measurement) {
       if (measurement.scene != entry.scene || !measurement.quantity.starts_with(entry.quantity)) return;
       measured = true;
-      deviates = deviates || verdict_on(report.engine, measurement) != Verdict::kPass;
+      deviates = deviates || status_of(report.engine, measurement) != CheckStatus::kPass;
     });
     const bool scene_ran = std::any_of(report.scenes.begin(), report.scenes.end(), [&](const SceneReport& scene) {
       return scene.name == entry.scene && scene.run.skipped.empty();

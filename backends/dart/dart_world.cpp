@@ -177,10 +177,10 @@ void DartWorld::read_poses(std::vector<Eigen::Matrix3d>& R_WL, std::vector<Eigen
   }
 }
 
-void DartWorld::apply(const LinkPushes& pushes) {
+void DartWorld::apply(const ExternalForces& pushes) {
   skeleton_->clearExternalForces();
   for (std::size_t link = 0; link < bodies_.size(); ++link) {
-    const LinkPushes::Push& push = pushes.all()[link];
+    const ExternalForces::Push& push = pushes.all()[link];
     if (push.f_W != Eigen::Vector3d::Zero()) bodies_[link]->addExtForce(push.f_W, push.p_L);
   }
 }

@@ -43,7 +43,7 @@ class DartWorld {
   // Poses of the links at the current state.
   void read_poses(std::vector<Eigen::Matrix3d>& R_WL, std::vector<Eigen::Vector3d>& p_WL) const;
   // Forces of the coming step beside the law and the contacts.
-  void apply(const LinkPushes& pushes);
+  void apply(const ExternalForces& pushes);
   // `state`: as read_state() gives it. False where the velocities left any sensible range: then the state is useless.
   [[nodiscard]] bool step(const JointCommand& command, const RobotState& state, std::span<const ContactPoint> points);
 

@@ -90,7 +90,7 @@ class MujocoBackend final : public Backend {
   void apply_pushes() {
     for (size_t link = 0; link < pushes_.all().size(); ++link) {
       const int body = compiled_.link_body[link];
-      const LinkPushes::Push& push = pushes_.all()[link];
+      const ExternalForces::Push& push = pushes_.all()[link];
       const Eigen::Vector3d p_W = position(body) + rotation(body) * push.p_L;
       const Eigen::Vector3d arm = p_W - Eigen::Map<const Eigen::Vector3d>(d_.xipos + 3 * body);
       Eigen::Map<Eigen::Vector3d>(d_.xfrc_applied + 6 * body) = push.f_W;
@@ -185,7 +185,7 @@ class MujocoBackend final : public Backend {
   MovingPartner partner_;
   MujocoLaw law_;
   Eigen::VectorXd v_before_;
-  LinkPushes pushes_;
+  ExternalForces pushes_;
   std::vector<int> order_;
 };
 

@@ -87,7 +87,8 @@ double row_velocity(const mjContact& contact, int row, bool pyramidal, const Eig
   return along[0] + (row % 2 == 0 ? 1.0 : -1.0) * contact.friction[tangent] * along[1 + tangent];
 }
 
-void set_rows(const mjModel& m, mjData& d, const mjContact& contact, const Skin& skin, const Eigen::Vector3d& along) {
+void set_rows(const mjModel& m, mjData& d, const mjContact& contact, const ContactCompliance& skin,
+              const Eigen::Vector3d& along) {
   const double dt = m.opt.timestep;
   const bool pyramidal = m.opt.cone == mjCONE_PYRAMIDAL;
   const double damping = skin.damping + dt * skin.stiffness;
@@ -117,7 +118,7 @@ void set_skin_rows(const Scene& scene, const MovingPartner& partner, const Mujoc
     if (human.side != ContactSide::kHuman || contact.efc_address < 0) continue;
     const HumanCapsule& capsule = scene.human.capsules[human.index];
     const int points = points_of_pair(d, i);
-    const Skin skin{capsule.skin.stiffness / points, capsule.skin.damping / points};
+    const ContactCompliance skin{capsule.skin.stiffness / points, capsule.skin.damping / points};
     const Eigen::Vector3d v_W = capsule_velocity(capsule, partner, Eigen::Vector3d(contact.pos));
     // The rows of the frame are the normal and two tangents; velocities are those of the second geom.
     const Eigen::Vector3d along = Eigen::Map<const Eigen::Matrix3d>(contact.frame).transpose() * v_W;

@@ -98,7 +98,7 @@ void ContactForecast::add_row(Part& part, double friction, double compliance, do
   ++part.rows;
 }
 
-void ContactForecast::add(const ContactPoint& point, const Softness& normal, double tangential,
+void ContactForecast::add(const ContactPoint& point, const ConstraintSoftness& normal, double tangential,
                           std::span<const Eigen::Matrix3d> R_WL, std::span<const Eigen::Vector3d> p_WL,
                           const Eigen::VectorXd& v0) {
   Part& part = next_part();
@@ -137,7 +137,7 @@ void ContactForecast::add_link(Part& part, int link, double sign, const Eigen::V
   for (int k = 5; k >= 0; --k) part.support.push_back(k);
 }
 
-void ContactForecast::add_stop(int joint, double side, double depth, const Softness& softness) {
+void ContactForecast::add_stop(int joint, double side, double depth, const ConstraintSoftness& softness) {
   Part& part = next_part();
   part.joint = joint;
   part.side = side;

@@ -25,10 +25,10 @@ class ContactForecast {
   void clear();
   // With the poses of all links and the velocity that the step would end with without contacts. `normal`: along the
   // normal; `tangential`: compliance of friction [m/(N s)].
-  void add(const ContactPoint& point, const Softness& normal, double tangential, std::span<const Eigen::Matrix3d> R_WL,
-           std::span<const Eigen::Vector3d> p_WL, const Eigen::VectorXd& v0);
+  void add(const ContactPoint& point, const ConstraintSoftness& normal, double tangential,
+           std::span<const Eigen::Matrix3d> R_WL, std::span<const Eigen::Vector3d> p_WL, const Eigen::VectorXd& v0);
   // The stop of a joint that is passed by `depth` >= 0 [rad]; it pushes towards `side`. After all contacts.
-  void add_stop(int joint, double side, double depth, const Softness& softness);
+  void add_stop(int joint, double side, double depth, const ConstraintSoftness& softness);
 
   // The generalised velocity (robots/kinematics.h) from v0 to v, with the factor of A.
   void solve(const TreeFactor& factor, Eigen::VectorXd& v);

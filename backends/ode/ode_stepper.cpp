@@ -11,7 +11,7 @@ namespace {
 // Share of the bound on friction below which a contact is foreseen to stick.
 constexpr double kSticks = 0.95;
 
-Softness softness_of(const ContactPoint& point, const OdeOptions& options, double dt) {
+ConstraintSoftness softness_of(const ContactPoint& point, const OdeOptions& options, double dt) {
   if (point.side != ContactSide::kHuman) return options.contact;
   return spring_damper(point.skin.stiffness, point.skin.damping, dt);
 }
@@ -33,8 +33,8 @@ OdeStepper::OdeStepper(const Scene& scene, std::size_t contacts)
   push_jacobian_ = Eigen::MatrixXd::Zero(3, n);
 }
 
-bool OdeStepper::advance(const JointCommand& command, std::span<const ContactPoint> points, const LinkPushes* pushes,
-                         RobotState& state) {
+bool OdeStepper::advance(const JointCommand& command, std::span<const ContactPoint> points,
+                         const ExternalForces* pushes, RobotState& state) {
   if (!foresee(state, command, points, pushes)) return false;
   world_.write_to(before_);
   step(points, pushes, !options_.stick);
@@ -48,7 +48,7 @@ bool OdeStepper::advance(const JointCommand& command, std::span<const ContactPoi
 }
 
 bool OdeStepper::foresee(const RobotState& state, const JointCommand& command, std::span<const ContactPoint> points,
-                         const LinkPushes* pushes) {
+                         const ExternalForces* pushes) {
   if (!law_.begin(state, command)) return false;
   Q_.setZero();
   if (pushes != nullptr) add_pushes(*pushes);
@@ -97,9 +97,9 @@ void OdeStepper::add_stop_torques() {
     if (!world_.has_stop(i)) tau_[i] += forecast_.stop_impulse(i) / dt_;
 }
 
-void OdeStepper::add_pushes(const LinkPushes& pushes) {
+void OdeStepper::add_pushes(const ExternalForces& pushes) {
   for (int link = 0; link < static_cast<int>(pushes.all().size()); ++link) {
-    const LinkPushes::Push& push = pushes.all()[link];
+    const ExternalForces::Push& push = pushes.all()[link];
     if (push.f_W.isZero(0.0)) continue;
     const Eigen::Vector3d p_W = world_.positions()[link] + world_.rotations()[link] * push.p_L;
     law_.kinematics().point_jacobian(link, p_W, push_jacobian_);
@@ -107,13 +107,13 @@ void OdeStepper::add_pushes(const LinkPushes& pushes) {
   }
 }
 
-void OdeStepper::step(std::span<const ContactPoint> points, const LinkPushes* pushes, bool all_bounded) {
+void OdeStepper::step(std::span<const ContactPoint> points, const ExternalForces* pushes, bool all_bounded) {
   world_.clear_contacts();
   for (std::size_t i = 0; i < points.size(); ++i) world_.add_contact(contact(points[i], i, all_bounded));
   for (int i = 0; i < robot_->dof(); ++i) world_.add_torque(i, tau_[i]);
   if (pushes != nullptr)
     for (int link = 0; link < static_cast<int>(pushes->all().size()); ++link)
-      if (const LinkPushes::Push& push = pushes->all()[link]; !push.f_W.isZero(0.0))
+      if (const ExternalForces::Push& push = pushes->all()[link]; !push.f_W.isZero(0.0))
         world_.add_force(link, push.f_W, push.p_L);
   world_.step();
 }

@@ -23,7 +23,7 @@ class OdeStepper {
   [[nodiscard]] const OdeWorld& world() const { return world_; }
 
   // `state` to that after a step with these contacts. False: the state left the range of numbers or of sense.
-  bool advance(const JointCommand& command, std::span<const ContactPoint> points, const LinkPushes* pushes,
+  bool advance(const JointCommand& command, std::span<const ContactPoint> points, const ExternalForces* pushes,
                RobotState& state);
   [[nodiscard]] Eigen::Vector3d contact_force(std::size_t i) const { return world_.contact_force(i); }
   // The law's torques in the last step. [N m]
@@ -31,13 +31,13 @@ class OdeStepper {
 
  private:
   bool foresee(const RobotState& state, const JointCommand& command, std::span<const ContactPoint> points,
-               const LinkPushes* pushes);
+               const ExternalForces* pushes);
   void foresee_free();
   void foresee_contacts();
   void add_stops(const RobotState& state);
   void add_stop_torques();
-  void add_pushes(const LinkPushes& pushes);
-  void step(std::span<const ContactPoint> points, const LinkPushes* pushes, bool all_bounded);
+  void add_pushes(const ExternalForces& pushes);
+  void step(std::span<const ContactPoint> points, const ExternalForces* pushes, bool all_bounded);
   [[nodiscard]] OdeContact contact(const ContactPoint& point, std::size_t i, bool all_bounded);
   [[nodiscard]] bool all_stuck(std::span<const ContactPoint> points) const;
 

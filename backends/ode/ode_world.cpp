@@ -343,8 +343,8 @@ OdeOptions ode_options(const EngineOptions& options) {
   const std::span<const EngineOption> known = ode_option_table();
   check_options("ode", options, known);
   const auto softness = [&](const std::string& of) {
-    return Softness{.erp = option_number(options, known, of + "_erp"),
-                    .cfm = option_number(options, known, of + "_cfm")};
+    return ConstraintSoftness{.erp = option_number(options, known, of + "_erp"),
+                              .cfm = option_number(options, known, of + "_cfm")};
   };
   return {.joint = softness("joint"),
           .stop = softness("stop"),

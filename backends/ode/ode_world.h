@@ -19,11 +19,11 @@ namespace duet {
 // The settings of ODE that a profile may change, with their defaults.
 
 struct OdeOptions {
-  Softness joint = {};    // of hinges
-  Softness stop = {};     // of joint stops
-  Softness contact = {};  // of contacts with the ground and between links
-  bool stick = true;      // contacts that are foreseen to stick are given to ODE without a bound on friction
-  int sweeps = 0;         // of Gauss-Seidel, where the forecast of ODE's forces needs it
+  ConstraintSoftness joint = {};    // of hinges
+  ConstraintSoftness stop = {};     // of joint stops
+  ConstraintSoftness contact = {};  // of contacts with the ground and between links
+  bool stick = true;                // contacts that are foreseen to stick are given to ODE without a bound on friction
+  int sweeps = 0;                   // of Gauss-Seidel, where the forecast of ODE's forces needs it
 };
 
 std::span<const EngineOption> ode_option_table();
@@ -49,7 +49,7 @@ struct OdeContact {
   Eigen::Matrix3d axes_W = Eigen::Matrix3d::Identity();  // columns: normal towards the link, two tangents
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    // along the axes, that the link shall have [m/s]
   double depth = 0.0;                                    // [m]
-  Softness softness = {};                                // along the normal
+  ConstraintSoftness softness = {};                      // along the normal
   double slip = 0.0;                                     // compliance along the tangents [m/(N s)]
   double friction_bound = 0.0;                           // along either tangent [N]
   // Holds the point to the ground along all axes instead, with the softness of the normal.

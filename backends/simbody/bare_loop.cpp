@@ -10,7 +10,7 @@ double simbody_bare_step_seconds(const Scene& scene, const RobotState& state, co
   require(steps >= 1, "simbody_bare_step_seconds: steps is {}, expected >= 1", steps);
   NarrowPhase narrow_phase(scene);
   SimbodyStepper stepper(scene, narrow_phase.capacity());
-  const LinkPushes no_pushes(scene.robot->links.size());
+  const ExternalForces no_pushes(scene.robot->links.size());
   RobotState moving = state;
   const double begin = thread_cpu_seconds();
   for (int step = 0; step < steps; ++step)

@@ -30,7 +30,7 @@ SimbodyStepper::SimbodyStepper(const Scene& scene, std::size_t contacts)
       v_(no_force_),
       a_(no_force_) {}
 
-bool SimbodyStepper::step(RobotState& state, const JointCommand& command, const LinkPushes& pushes,
+bool SimbodyStepper::step(RobotState& state, const JointCommand& command, const ExternalForces& pushes,
                           const MovingPartner& partner, NarrowPhase& narrow_phase) {
   model_.update(state);
   if (pushes.any()) apply(pushes);
@@ -43,7 +43,7 @@ bool SimbodyStepper::step(RobotState& state, const JointCommand& command, const 
   return true;
 }
 
-void SimbodyStepper::apply(const LinkPushes& pushes) {
+void SimbodyStepper::apply(const ExternalForces& pushes) {
   for (std::size_t link = 0; link < pushes.all().size(); ++link)
     model_.apply(static_cast<int>(link), pushes.all()[link].f_W, pushes.all()[link].p_L);
 }
@@ -67,7 +67,7 @@ void SimbodyStepper::solve(const RobotState& state, std::span<const ContactPoint
 
 // Adds the stops of joints that would end the step beyond one.
 void SimbodyStepper::add_stops(const RobotState& state) {
-  const Softness soft = {.erp = settings_.stop_erp, .cfm = 0.0};
+  const ConstraintSoftness soft = {.erp = settings_.stop_erp, .cfm = 0.0};
   for (int i = 0; i < robot_->dof(); ++i) {
     const RobotJoint& joint = robot_->joints[i];
     const double next = state.q[i] + dt_ * v_[6 + i];

@@ -33,7 +33,7 @@ class SimbodyStepper {
   SimbodyStepper(const Scene& scene, std::size_t contacts);
 
   // Moves `state` on by dt; contacts() are then of the step. False where the state has diverged: it stays as it was.
-  [[nodiscard]] bool step(RobotState& state, const JointCommand& command, const LinkPushes& pushes,
+  [[nodiscard]] bool step(RobotState& state, const JointCommand& command, const ExternalForces& pushes,
                           const MovingPartner& partner, NarrowPhase& narrow_phase);
 
   [[nodiscard]] const ContactSolver& contacts() const { return contacts_; }  // contact i is of point i
@@ -41,7 +41,7 @@ class SimbodyStepper {
   [[nodiscard]] const Eigen::VectorXd& acceleration() const { return a_; }  // (6 + dof), mean over the step
 
  private:
-  void apply(const LinkPushes& pushes);
+  void apply(const ExternalForces& pushes);
   void solve(const RobotState& state, std::span<const ContactPoint> points);
   void add_stops(const RobotState& state);
   void advance(RobotState& state) const;
@@ -49,7 +49,7 @@ class SimbodyStepper {
   std::shared_ptr<const RobotModel> robot_;
   double dt_;
   SimbodySettings settings_;
-  Softness rigid_;
+  ConstraintSoftness rigid_;
   SimbodyModel model_;
   ImplicitLaw law_;
   ContactSolver contacts_;

@@ -158,7 +158,7 @@ class NetworkReader {
   }
   void expect(const std::string& what, const std::string& expected, const std::string& found) const {
     if (expected != found)
-      throw InputError(fmt::format("{}: {} is '{}', expected '{}'", file_, what, shown(found), expected));
+      throw InputError(fmt::format("{}: {} is '{}', expected '{}'", file_, what, excerpt(found), expected));
   }
   [[nodiscard]] Eigen::VectorXf vector(const std::string& name, Eigen::Index size) const {
     const auto found = tensors_.tensors.find(name);
@@ -254,7 +254,7 @@ long whole_number(const NetworkReader& reader, const std::string& key, const std
   try {
     return std::stol(text);
   } catch (const std::exception&) {
-    throw InputError(fmt::format("{}: '{}' in the header is '{}', expected a whole number", file, key, shown(text)));
+    throw InputError(fmt::format("{}: '{}' in the header is '{}', expected a whole number", file, key, excerpt(text)));
   }
 }
 
@@ -325,7 +325,7 @@ WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot) {
   WbcNetwork network;
   const std::string kind = reader.text("kind");
   if (kind != "oracle" && kind != "student")
-    throw InputError(fmt::format("{}: kind is '{}', expected 'oracle' or 'student'", path, shown(kind)));
+    throw InputError(fmt::format("{}: kind is '{}', expected 'oracle' or 'student'", path, excerpt(kind)));
   network.kind = kind == "oracle" ? WbcKind::kOracle : WbcKind::kStudent;
   require_made_for(reader.text("robot"), robot, path);
   check_joints(reader, robot, path);

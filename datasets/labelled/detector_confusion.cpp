@@ -157,14 +157,14 @@ TextTable wrong_table(const std::vector<LabelledVerdicts>& verdicts, const std::
         const bool act = clip.label == to_string(task);
         for (const int who : {0, 1})
           if (accepted(clip, set, task)[who] != act)
-            table.rows.push_back({std::string(to_string(set)), shown(clip.clip), clip.label, who == 0 ? "A" : "B",
+            table.rows.push_back({std::string(to_string(set)), excerpt(clip.clip), clip.label, who == 0 ? "A" : "B",
                                   std::string(to_string(task)), act ? "missed" : "accepted"});
       }
     }
   }
   for (const LabelledVerdicts& clip : verdicts)
     if (!clip.message.empty())
-      table.rows.push_back({"-", shown(clip.clip), "-", "-", "-", "not read: " + clip.message});
+      table.rows.push_back({"-", excerpt(clip.clip), "-", "-", "-", "not read: " + clip.message});
   return table;
 }
 
@@ -243,7 +243,7 @@ std::vector<LabelledSource> sources_of(const LabelledClips& clips) {
   if (clips.format.empty() && is_clip_of_duet(clips.paths.front())) {
     for (const std::string& file : find_motion_files(clips.paths))
       sources.push_back({stem_of(file), [file] {
-                           return naming_file(file, [&] {
+                           return with_file_context(file, [&] {
                              const InteractionClip clip = load_clip(file);
                              return people_of(clip, std::string(to_string(clip.task)));
                            });
@@ -274,7 +274,7 @@ std::optional<Task> task_meant(const std::string& label) {
 // One spelling a label: "Shake hands" and "handshake" are one line.
 std::string plain_label(const std::string& label) {
   const std::optional<Task> task = task_meant(label);
-  return task ? std::string(to_string(*task)) : shown(label);
+  return task ? std::string(to_string(*task)) : excerpt(label);
 }
 
 LabelledPeople read_labelled(const LabelledSource& source, const ClipLabels& labels) {
@@ -289,7 +289,7 @@ LabelledPeople read_labelled(const LabelledSource& source, const ClipLabels& lab
   people.label = plain_label(told != labels.end() ? told->second : people.label);
   if (people.label.empty())
     throw InputError(fmt::format("'{}': neither the clip nor a file of labels says which act it is: give --labels FILE",
-                                 shown(source.clip)));
+                                 excerpt(source.clip)));
   return people;
 }
 
@@ -332,11 +332,11 @@ ClipLabels parse_clip_labels(std::string_view text, const std::string& name) {
     if (rows.blank()) continue;
     const auto fields = rows.fields();
     if (fields.size() != kLabelsHeader.size())
-      rows.fail(
-          fmt::format("expected 2 fields (clip,label), found '{}'", shown(fmt::format("{}", fmt::join(fields, ",")))));
+      rows.fail(fmt::format("expected 2 fields (clip,label), found '{}'",
+                            excerpt(fmt::format("{}", fmt::join(fields, ",")))));
     if (fields[0].empty()) rows.fail("expected a clip's name in the first field, found none");
     if (!labels.emplace(fields[0], fields[1]).second)
-      rows.fail(fmt::format("clip '{}' is there twice", shown(fields[0])));
+      rows.fail(fmt::format("clip '{}' is there twice", excerpt(fields[0])));
   }
   return labels;
 }

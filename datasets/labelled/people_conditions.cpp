@@ -27,9 +27,9 @@ bool stands_still(const Agent& agent) {
   return rests(agent.lhand) && rests(agent.rhand) && rests(agent.head);
 }
 
-PersonVerdict verdict_of(const std::string& clip, const std::string& label, char person, const Agent& performer,
-                         const Agent& partner) {
-  PersonVerdict verdict{.clip = clip, .label = label, .person = person, .by_task = {}};
+PersonCheck verdict_of(const std::string& clip, const std::string& label, char person, const Agent& performer,
+                       const Agent& partner) {
+  PersonCheck verdict{.clip = clip, .label = label, .person = person, .by_task = {}};
   const InteractionEvidence evidence{
       .performer = performer, .partner = partner, .window = {0, static_cast<int>(performer.root.cols())}};
   for (const Task task : all_tasks())
@@ -55,7 +55,7 @@ struct TaskShares {
 
 TaskShares shares_of(const PeopleVerdicts& verdicts, Task task) {
   TaskShares shares;
-  for (const PersonVerdict& person : verdicts.people) {
+  for (const PersonCheck& person : verdicts.people) {
     const auto found = person.by_task.find(task);
     if (found == person.by_task.end()) continue;
     const DetectorResult& result = found->second;
@@ -100,7 +100,7 @@ PeopleVerdicts judge_people(const LabelledClips& clips, const std::function<void
   const std::vector<LabelledSource> sources = labelled_sources(clips);
   struct Judged {
     std::string message;
-    std::vector<PersonVerdict> people;
+    std::vector<PersonCheck> people;
     long still = 0;
   };
   std::vector<Judged> judged(sources.size());
@@ -145,14 +145,14 @@ TextTable people_conditions_table(const PeopleVerdicts& verdicts) {
 
 TextTable people_failures_table(const PeopleVerdicts& verdicts) {
   TextTable table{.header = {"clip", "person", "label", "rule", "failed", "measured"}, .rows = {}, .label_columns = 6};
-  for (const PersonVerdict& person : verdicts.people)
+  for (const PersonCheck& person : verdicts.people)
     for (const auto& [task, result] : person.by_task)
       if (result.success != (person.label == to_string(task)))
-        table.rows.push_back({shown(person.clip), std::string(1, person.person), person.label,
+        table.rows.push_back({excerpt(person.clip), std::string(1, person.person), person.label,
                               std::string(to_string(task)), result.success ? "accepted" : failed_parts(result),
                               measured(result)});
   for (const auto& [clip, message] : verdicts.unread)
-    table.rows.push_back({shown(clip), "-", "-", "-", "not read", message});
+    table.rows.push_back({excerpt(clip), "-", "-", "-", "not read", message});
   return table;
 }
 

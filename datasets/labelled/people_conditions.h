@@ -18,14 +18,14 @@
 namespace duet {
 
 // One performer under the rule of one task. Conditions: act, alone, touch, body, reply.
-struct PersonVerdict {
+struct PersonCheck {
   std::string clip, label;
   char person = 'A';  // or B
   std::map<Task, DetectorResult> by_task;
 };
 
 struct PeopleVerdicts {
-  std::vector<PersonVerdict> people;          // in the order of the files
+  std::vector<PersonCheck> people;            // in the order of the files
   std::map<std::string, std::string> unread;  // by clip: why
   long still = 0;                             // people who stand still
 };

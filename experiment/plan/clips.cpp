@@ -21,7 +21,7 @@
 #include "duet/core/share.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/experiment/work/run_work.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/motion/npz_fields.h"
 #include "duet/motion/people/tracked_clip.h"
 #include "duet/motion/synthesis/synthesis.h"
@@ -158,7 +158,7 @@ InteractionClip synthesize(const SyntheticClip& source) {
   if (source.cropped) options.before = options.after = std::nullopt;
   if (source.variant != nullptr) vary(*source.variant, options);
   InteractionClip clip = synthesize(source.task, options);
-  if (source.tracked) clip = tracked(clip, {}, source.seed);
+  if (source.tracked) clip = add_tracker_noise(clip, {}, source.seed);
   clip = with_padding(std::move(clip), frozen);
   clip.id = id_of(source);
   return clip;
@@ -167,7 +167,7 @@ InteractionClip synthesize(const SyntheticClip& source) {
 // The label that tells a clip that is made from others.
 std::string label_of(const SyntheticClip& clip) {
   std::string label = fmt::format("{} {} {}", to_string(clip.task), clip.seed, clip.index);
-  if (clip.like != Likeness::kRehearsed) label += fmt::format(" like={}", name_of(likeness_names(), clip.like));
+  if (clip.like != Likeness::kScripted) label += fmt::format(" like={}", name_of(likeness_names(), clip.like));
   if (clip.cropped) label += " cropped";
   if (clip.tracked) label += " tracked";
   if (clip.variant == nullptr) return label;
@@ -257,7 +257,7 @@ void note_all(const std::vector<LoadedMotion>& made, Progress& progress) {
 std::vector<LoadedMotion> make_clips(const std::vector<ClipSource>& sources, const RobotModel& robot,
                                      const PairOptions& options, int threads, Progress& progress,
                                      const ClipPadding& pad = {}, const PreparedClips& prepared = {"", ""},
-                                     const StopSign* stop = nullptr, const FileDigests* files = nullptr) {
+                                     const StopToken* stop = nullptr, const FileDigests* files = nullptr) {
   std::vector<LoadedMotion> made(sources.size());
   progress.start("preparing clips", static_cast<int>(sources.size()), "clips");
   parallel_for_each(static_cast<int>(sources.size()), threads, [&](int i) {
@@ -300,7 +300,7 @@ void check_ids(const std::vector<PairedMotion>& clips) {
     for (size_t j = i + 1; j < clips.size(); ++j) {
       if (clips[i].clip_id == clips[j].clip_id && clips[i].task == clips[j].task)
         throw InputError(fmt::format("two clips of task {} have the id '{}'; ids name episodes and must differ",
-                                     to_string(clips[i].task), shown(clips[i].clip_id)));
+                                     to_string(clips[i].task), excerpt(clips[i].clip_id)));
     }
   }
 }
@@ -314,15 +314,15 @@ MotionFile kind_of(const Npz& npz) {
   if (schema == "duet.recording") return MotionFile::kRecording;
   throw InputError(fmt::format(
       "'{}': key 'schema': expected 'duet.interaction_clip', 'duet.paired_motion' or 'duet.recording', found '{}'",
-      npz.name(), shown(schema)));
+      npz.name(), excerpt(schema)));
 }
 
 LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const PairOptions& options,
                               Implausible implausible, const ClipPadding& pad, bool other_role) {
-  return naming_file(npz.name(), [&]() -> LoadedMotion {
+  return with_file_context(npz.name(), [&]() -> LoadedMotion {
     switch (kind_of(npz)) {
       case MotionFile::kClip: {
-        ForeignClip read = read_foreign_clip(npz, implausible);
+        ImportedClip read = read_foreign_clip(npz, implausible);
         InteractionClip clip = with_padding(std::move(read.clip), pad);
         if (other_role) clip = in_other_role(std::move(clip));
         return {retarget(clip, robot, options), other_role ? std::vector<std::string>() : std::move(read.notes)};
@@ -481,7 +481,7 @@ std::optional<PairedMotion> PreparedClips::find(const std::string& source) const
 
 void PreparedClips::keep(const std::string& source, const PairedMotion& clip) const {
   try {
-    if (keeps()) save_paired_motion(clip, inside(folder_, name_of(source)));
+    if (keeps()) save_paired_motion(clip, join_without_links(folder_, name_of(source)));
   } catch (const StorageError&) {
     return;  // it saves time, nothing else: where the disk is full, the first row says so
   }

@@ -18,11 +18,11 @@
 namespace duet {
 
 class Progress;
-class StopSign;
+class StopToken;
 
 struct PrepareOptions {
-  std::string keep_in = {};        // a run folder that keeps the clips as each is finished (experiment/plan/clips.h)
-  const StopSign* stop = nullptr;  // asked before each clip
+  std::string keep_in = {};         // a run folder that keeps the clips as each is finished (experiment/plan/clips.h)
+  const StopToken* stop = nullptr;  // asked before each clip
   // Digests that the files' must be (RunIdentity::files), for those that it has; InputError for another one.
   const FileDigests* files = nullptr;
 };
@@ -45,7 +45,7 @@ LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const Pai
 
 // Clips whose task the suite runs, in a fixed order (task, then index or file). Retargets on `threads` threads; what
 // there is to know of them is noted on `progress`. Throws InputError where none remains, Stopped
-// (experiment/work/stop_sign.h) where it was asked to stop.
+// (experiment/work/stop_token.h) where it was asked to stop.
 std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
                                         const PrepareOptions& options = {});
 
@@ -57,7 +57,7 @@ std::map<std::string, Tags> synthetic_clips(const std::vector<Task>& tasks, cons
 // them frozen in its first frame as padded recordings are.
 std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const PairOptions& pair,
                                           const std::vector<Task>& tasks, int per_task, std::uint64_t seed, int threads,
-                                          Progress& progress, Likeness like = Likeness::kRehearsed);
+                                          Progress& progress, Likeness like = Likeness::kScripted);
 
 PairOptions pair_options(const Suite& suite);
 

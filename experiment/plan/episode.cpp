@@ -81,7 +81,7 @@ bool chosen(const std::vector<std::string>& names, std::string_view name) {
 
 bool can_run_in(const std::string& engine) { return engine == kPlaybackEngine || is_available(engine); }
 
-EpisodePlan::EpisodePlan(const Suite& suite, const Bodies& bodies, const RunPart& part)
+EpisodePlan::EpisodePlan(const Suite& suite, const Embodiments& bodies, const EpisodeFilter& part)
     : suite_(suite),
       bodies_(bodies),
       suite_id_(suite.name + "@" + suite.version),
@@ -144,7 +144,7 @@ std::vector<std::string> left_out(const std::vector<std::string>& filter, const 
   return names;
 }
 
-void check_filters(const RunPart& part, const Suite& suite) {
+void check_filters(const EpisodeFilter& part, const Suite& suite) {
   const auto check = [](const std::vector<std::string>& filter, const std::vector<std::string>& known,
                         const char* kind) {
     for (const std::string& name : filter)
@@ -162,13 +162,14 @@ void check_filters(const RunPart& part, const Suite& suite) {
   check(part.perturbations, suite.perturbation_names(), "perturbation");
 }
 
-bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part) {
+bool belongs(const EpisodeSpec& spec, Task task, const EpisodeFilter& part) {
   return chosen(part.engines, spec.engine) && chosen(part.controllers, spec.controller->name) &&
          (spec.arm == "null" || chosen(part.policies, spec.policy->name)) && chosen(part.tasks, to_string(task)) &&
          (spec.engine == kPlaybackEngine || chosen(part.perturbations, spec.perturbation->name));
 }
 
-std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts) {
+std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips,
+                            const std::vector<EpisodeFilter>& parts) {
   std::int64_t total = 0;
   const std::vector<EpisodeArm> arms = arms_of(suite);
   for (EpisodeSpec spec : combinations_of(suite)) {
@@ -176,7 +177,7 @@ std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, 
       spec.policy = &arm.policy;
       spec.arm = arm.name;
       total += std::ranges::count_if(clips, [&](Task task) {
-        return std::ranges::any_of(parts, [&](const RunPart& part) { return belongs(spec, task, part); });
+        return std::ranges::any_of(parts, [&](const EpisodeFilter& part) { return belongs(spec, task, part); });
       });
     }
   }

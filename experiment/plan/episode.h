@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "duet/core/task.h"
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/rows/episode_row.h"
@@ -61,8 +61,9 @@ class EpisodePlan {
  public:
   // `part`: those of it alone, in the same order. Throws InputError where a task with a shuffled partner has one clip
   // alone, for more than kMostEpisodes, and for a part without an episode.
-  EpisodePlan(const Suite& suite, const Bodies& bodies, const RunPart& part = {});
-  EpisodePlan(Suite&&, const Bodies&, const RunPart& = {}) = delete;  // a suite that is gone by the next line
+  EpisodePlan(const Suite& suite, const Embodiments& bodies, const EpisodeFilter& part = {});
+  EpisodePlan(Suite&&, const Embodiments&,
+              const EpisodeFilter& = {}) = delete;  // a suite that is gone by the next line
   EpisodePlan(const EpisodePlan&) = delete;
   EpisodePlan& operator=(const EpisodePlan&) = delete;
 
@@ -73,7 +74,7 @@ class EpisodePlan {
   [[nodiscard]] std::uint64_t seed(const PairedMotion& clip, int episode, const char* stream) const;
 
   const Suite& suite_;
-  const Bodies& bodies_;
+  const Embodiments& bodies_;
   std::string suite_id_;
   Perturbation clean_;                              // of playback
   std::map<std::string, EngineSettings> settings_;  // by engine
@@ -89,14 +90,15 @@ bool chosen(const std::vector<std::string>& names, std::string_view name);
 std::vector<std::string> left_out(const std::vector<std::string>& filter, const std::vector<std::string>& known);
 
 // Throws std::invalid_argument for a name that the suite does not have: a mistake, not an empty run.
-void check_filters(const RunPart& part, const Suite& suite);
+void check_filters(const EpisodeFilter& part, const Suite& suite);
 
 // Whether the episode, of a clip of this task, belongs to the part; playback to every choice of perturbations, the null
 // arm to every choice of policies.
-bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part);
+bool belongs(const EpisodeSpec& spec, Task task, const EpisodeFilter& part);
 
 // How many episodes of a suite, over clips of these tasks, belong to one of these parts.
-std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts);
+std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips,
+                            const std::vector<EpisodeFilter>& parts);
 
 // The cost of an episode in each engine with each controller, and how much of a run's work is done: engines differ by a
 // factor of twenty, so that counting episodes says nothing of the time that is left. Thread-safe.

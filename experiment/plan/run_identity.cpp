@@ -7,7 +7,7 @@
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/core/digest.h"
 #include "duet/core/require.h"
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/metrics/detector.h"
 #include "duet/policies/catalogue/registry.h"

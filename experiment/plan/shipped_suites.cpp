@@ -91,7 +91,7 @@ ShippedSuite shipped_suite(const std::string& name) {
   const std::string file = path_of(name);
   const Suite suite = load_suite(file);
   return {name, fmt::format("{} {}", suite.name, suite.version), first_sentence(read_file(file)),
-          count_episodes(suite, suite.tasks_of_own_clips(), {RunPart()}), suite.clips.given};
+          count_episodes(suite, suite.tasks_of_own_clips(), {EpisodeFilter()}), suite.clips.given};
 }
 
 std::string suite_file(const std::string& suite) {
@@ -116,12 +116,12 @@ std::string shipped_suite_note(const RunInfo& info) {
     if (!shipped) return "";
     const bool same = !shipped->clips.given && suite_hash(*shipped) == info.suite_hash;
     return fmt::format("{} ({})", same ? "as it ships" : difference_note(*shipped, info),
-                       shown(short_digest(info.suite_hash)));
+                       excerpt(short_digest(info.suite_hash)));
   } catch (const MissingError&) {
     return "";
   } catch (const InputError&) {  // a suite.yaml that this program does not read is none that ships
     return fmt::format("NOT the suite of that name that ships with this program ({})",
-                       shown(short_digest(info.suite_hash)));
+                       excerpt(short_digest(info.suite_hash)));
   }
 }
 

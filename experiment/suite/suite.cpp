@@ -155,7 +155,7 @@ const NameTable<ClipRoles>& role_names() {
 }
 
 const NameTable<Likeness>& likeness_names() {
-  static const NameTable<Likeness> names = {{"rehearsed", Likeness::kRehearsed}, {"people", Likeness::kPeople}};
+  static const NameTable<Likeness> names = {{"rehearsed", Likeness::kScripted}, {"people", Likeness::kPeople}};
   return names;
 }
 

@@ -131,7 +131,7 @@ struct SuiteClips {
   int synth_per_task = 0;  // synthesised clips of each task, or
   int synth_per_file = 0;  // of each task so many for each of its files, beside these
   std::uint64_t synth_seed = 42;
-  Likeness synth_like = Likeness::kRehearsed;
+  Likeness synth_like = Likeness::kScripted;
   bool synth_tracked = false;           // as a depth camera sees them (motion/people/tracked_clip.h)
   std::vector<std::string> files;       // clips or paired motions (NPZ)
   bool given = false;                   // the files are yet to be given (`duet run --clips`)
@@ -190,7 +190,7 @@ struct Suite {
   bool null_arm = true;
   std::vector<std::string> controls = {};  // scripted control arms (policies/controls/control_policy.h)
   bool allow_programs =
-      false;  // the user's word, never a file's: policies may start programs (experiment/plan/bodies.h)
+      false;  // the user's word, never a file's: policies may start programs (experiment/plan/embodiments.h)
 
   // Whether commanded velocities lead its episodes, in the place of clips and policies.
   [[nodiscard]] bool is_commanded() const { return !references.empty(); }

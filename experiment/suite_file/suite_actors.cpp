@@ -387,7 +387,7 @@ std::string synth_yaml(const SuiteClips& clips) {
   std::string text = clips.synth_per_task > 0 ? fmt::format("{{per_task: {}", clips.synth_per_task)
                                               : fmt::format("{{per_file: {}", clips.synth_per_file);
   text += fmt::format(", seed: {}", clips.synth_seed);
-  if (clips.synth_like != Likeness::kRehearsed)
+  if (clips.synth_like != Likeness::kScripted)
     text += fmt::format(", like: {}", name_of(likeness_names(), clips.synth_like));
   if (clips.synth_tracked) text += ", tracked: true";
   return text + variants_yaml(clips.variants) + "}";

@@ -116,7 +116,7 @@ std::string blamed(const std::string& message, const std::string& yaml, const st
                    const Overrides& overrides) {
   for (std::size_t i = overrides.size(); i-- > 0;)
     if (message_without(i, yaml, name, overrides) != message)
-      return fmt::format("override '{}={}': {}", overrides[i].first, shown(overrides[i].second),
+      return fmt::format("override '{}={}': {}", overrides[i].first, excerpt(overrides[i].second),
                          without_place(message, name));
   return message;
 }

@@ -30,8 +30,8 @@ std::string errors_sentence(int count, const std::string& first_error) {
   return fmt::format("{} episode{} ended with an error; the first, {}", count, count == 1 ? "" : "s", first_error);
 }
 
-void SharedWork::run(int count, int threads, const std::function<std::string(int)>& key_at,
-                     const std::function<EpisodeRow(int)>& run_at, Progress& progress) {
+void EpisodeDispatcher::run(int count, int threads, const std::function<std::string(int)>& key_at,
+                            const std::function<EpisodeRow(int)>& run_at, Progress& progress) {
   std::vector<int> left(count);
   std::iota(left.begin(), left.end(), 0);
   bool waited = false;
@@ -50,7 +50,7 @@ void SharedWork::run(int count, int threads, const std::function<std::string(int
   }
 }
 
-void SharedWork::take(int i, const std::string& key, const std::function<EpisodeRow(int)>& run_at) {
+void EpisodeDispatcher::take(int i, const std::string& key, const std::function<EpisodeRow(int)>& run_at) {
   switch (claim(key)) {
     case Claim::kTaken: {
       const std::lock_guard lock(mutex_);
@@ -73,12 +73,12 @@ void SharedWork::take(int i, const std::string& key, const std::function<Episode
   }
 }
 
-Claim SharedWork::claim(const std::string& key) {
+Claim EpisodeDispatcher::claim(const std::string& key) {
   const std::lock_guard lock(mutex_);
   return run_.claim(key);
 }
 
-void SharedWork::record(const EpisodeRow& row) {
+void EpisodeDispatcher::record(const EpisodeRow& row) {
   const std::lock_guard lock(mutex_);
   if (!run_.append(row)) {
     ++others_;

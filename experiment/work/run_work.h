@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/rows/folder/run_directory.h"
 
 namespace duet {
@@ -63,9 +63,9 @@ std::string error_text(const EpisodeRow& row);
 // The sentence about `count` of them, of which the first said so.
 std::string errors_sentence(int count, const std::string& first_error);
 
-class SharedWork {
+class EpisodeDispatcher {
  public:
-  SharedWork(RunDirectory& run, const StopSign& stop) : run_(run), stop_(stop) {}
+  EpisodeDispatcher(RunDirectory& run, const StopToken& stop) : run_(run), stop_(stop) {}
 
   // Episodes 0 to count - 1 by `run_at`, on `threads` threads. Returns when all have rows, or after the sign. Throws
   // what run_at and RunDirectory::append throw.
@@ -83,7 +83,7 @@ class SharedWork {
   void record(const EpisodeRow& row);
 
   RunDirectory& run_;
-  const StopSign& stop_;
+  const StopToken& stop_;
   std::mutex mutex_;
   std::vector<int> taken_;  // by others
   std::int64_t done_ = 0, others_ = 0;

@@ -12,7 +12,7 @@
 
 #include "duet/hardware/dds/dds_wire.h"
 #include "duet/hardware/guard/guard_loop.h"
-#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/twin/fakes.h"
 #include "duet/hardware/wire/datagram_socket.h"
 #include "duet/hardware/wire/lcm_message.h"
 
@@ -78,7 +78,7 @@ void every_period(const ServicesArguments& arguments, const Step& step) {
 void play_homie(const ServicesArguments& arguments) {
   TwinMotors motors(arguments);
   LcmChannel channel(arguments.lcm);
-  HomieStandIn homie;
+  FakeHomie homie;
   std::uint32_t sequence = 0;
   every_period(arguments, [&](double now) {
     LcmBuffer buffer;
@@ -91,7 +91,7 @@ void play_homie(const ServicesArguments& arguments) {
     const std::array<double, 4>& v = homie.velocity();
     motors.write(frame, {v[0], v[1], v[2], v[3]});
     (void)channel.send(
-        std::span<const std::byte>(buffer).first(HomieStandIn::write_echo(motors.reading(), sequence++, buffer)));
+        std::span<const std::byte>(buffer).first(FakeHomie::write_echo(motors.reading(), sequence++, buffer)));
   });
   const HomieTraffic& traffic = homie.traffic();
   fmt::print("homie: {} velocities, {} arm targets, {} refused, longest gap {:.3f} s\n", traffic.pedals, traffic.arms,
@@ -102,7 +102,7 @@ void play_sport(const ServicesArguments& arguments) {
   TwinMotors motors(arguments);
   const std::unique_ptr<SportServiceWire> wire = open_sport_service(arguments.place);
   const std::shared_ptr<const RobotModel> robot = load_shared_robot();
-  SportStandIn service(robot->default_command(robot->neutral), arguments.fsm);
+  FakeSport service(robot->default_command(robot->neutral), arguments.fsm);
   long calls = 0;
   every_period(arguments, [&](double now) {
     RpcRequest request;

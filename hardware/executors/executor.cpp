@@ -28,7 +28,7 @@ ExecutorKind executor_kind(const std::string& name) {
   for (std::size_t k = 0; k < kExecutorNames.size(); ++k)
     if (kExecutorNames[k] == name) return static_cast<ExecutorKind>(k);
   throw std::invalid_argument(
-      fmt::format("executor: expected {}, found '{}'", fmt::join(kExecutorNames, ", "), shown(name)));
+      fmt::format("executor: expected {}, found '{}'", fmt::join(kExecutorNames, ", "), excerpt(name)));
 }
 
 ExecutedChannels executed_channels(ExecutorKind kind, const RobotModel& robot, const std::vector<int>& joints) {

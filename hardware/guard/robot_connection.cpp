@@ -61,7 +61,7 @@ std::size_t choice(const YamlSection& top, const char* key, const std::array<std
   const std::string text = top.text(key);
   const auto found = std::ranges::find(names, text);
   if (found == names.end())
-    top.fail(top.line(key), fmt::format("'{}': expected {}, found '{}'", key, fmt::join(names, ", "), shown(text)));
+    top.fail(top.line(key), fmt::format("'{}': expected {}, found '{}'", key, fmt::join(names, ", "), excerpt(text)));
   return static_cast<std::size_t>(found - names.begin());
 }
 

@@ -34,7 +34,7 @@ HumanCapsule capsule_of(const Json& c, const std::string& name) {
                        .end = c.at(6)};
   for (const int joint : {capsule.joint_a, capsule.joint_b})
     if (joint < 0 || joint >= kSmplJoints)
-      throw InputError(fmt::format("{}: capsule '{}': expected joints 0 to {}, found {}", name, shown(capsule.name),
+      throw InputError(fmt::format("{}: capsule '{}': expected joints 0 to {}, found {}", name, excerpt(capsule.name),
                                    kSmplJoints - 1, joint));
   return capsule;
 }
@@ -51,7 +51,7 @@ std::shared_ptr<const RobotModel> robot_of(const std::string& robot, const std::
     if (robot.find_first_of("/.") == std::string::npos) return load_shared_robot(robot);
   } catch (const MissingError&) {
   }
-  throw InputError(fmt::format("{}: expected the name of a robot that ships, found '{}'", name, shown(robot)));
+  throw InputError(fmt::format("{}: expected the name of a robot that ships, found '{}'", name, excerpt(robot)));
 }
 
 Json contact_json(const ContactLimits& limits) {

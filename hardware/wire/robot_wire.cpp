@@ -23,7 +23,7 @@ void check_place(const DdsPlace& place) {
   require(place.domain >= 0 && place.domain <= kLastTwinDomain, "domain of DDS: expected 0 to {}, found {}",
           kLastTwinDomain, place.domain);
   require(is_name(place.interface) && place.interface != "auto",
-          "network interface: expected the name of one (not 'auto'), found '{}'", shown(place.interface));
+          "network interface: expected the name of one (not 'auto'), found '{}'", excerpt(place.interface));
 }
 
 void check_twin_place(const DdsPlace& place) {

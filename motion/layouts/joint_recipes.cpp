@@ -119,8 +119,8 @@ class ColumnFinder {
 
   void put(int& place, int column, const std::string& what) const {
     if (place >= 0)
-      throw InputError(fmt::format("skeleton '{}': columns {} ('{}') and {} ('{}') are both the {}", shown(skeleton_),
-                                   place, shown(given_[place]), column, shown(given_[column]), what));
+      throw InputError(fmt::format("skeleton '{}': columns {} ('{}') and {} ('{}') are both the {}", excerpt(skeleton_),
+                                   place, excerpt(given_[place]), column, excerpt(given_[column]), what));
     place = column;
   }
 
@@ -318,7 +318,7 @@ void require_parts(const BodyColumns& columns, const std::string& skeleton) {
     missing.emplace_back("head (or ears, nose, head top)");
   if (!missing.empty())
     throw InputError(
-        fmt::format("skeleton '{}': no column is the {}", shown(skeleton), fmt::join(missing, "; none the ")));
+        fmt::format("skeleton '{}': no column is the {}", excerpt(skeleton), fmt::join(missing, "; none the ")));
 }
 
 BodyColumns body_columns(const std::string& skeleton, const std::vector<std::string>& names) {
@@ -392,16 +392,16 @@ std::optional<JointNameMap> parse_joint_name_map(std::string_view text, const st
     const std::string_view line = trimmed(whole);
     if (line.empty() || line.front() == '#' || line == "---") continue;
     const auto refuse = [&](const std::string& fault) {
-      throw InputError(fmt::format("'{}': line {}: {}", shown(file, kShownSentence), number, fault));
+      throw InputError(fmt::format("'{}': line {}: {}", excerpt(file, kShownSentence), number, fault));
     };
     const std::size_t colon = line.find(':');
-    if (colon == std::string_view::npos) refuse(fmt::format("expected 'left_hip: NAME', found '{}'", shown(line)));
+    if (colon == std::string_view::npos) refuse(fmt::format("expected 'left_hip: NAME', found '{}'", excerpt(line)));
     const std::string joint(trimmed(line.substr(0, colon))), name = plain_value(line.substr(colon + 1));
     if (std::find(known.begin(), known.end(), joint) == known.end())
       refuse(unknown_name_message("joint", joint, known));
     if (name.empty()) refuse(fmt::format("expected the name of '{}' in the motion file, found none", joint));
     if (!joints.insert(joint).second) refuse(fmt::format("joint '{}' is there twice", joint));
-    if (!map.emplace(name, joint).second) refuse(fmt::format("'{}' is there twice", shown(name)));
+    if (!map.emplace(name, joint).second) refuse(fmt::format("'{}' is there twice", excerpt(name)));
   }
   return map;
 }
@@ -418,8 +418,8 @@ std::vector<std::string> mapped(const JointNameMap& map, const std::vector<std::
       throw InputError(
           fmt::format("'{}': no joint '{}', which the skeleton file names as the {}. It "
                       "has: {}",
-                      shown(file, kShownSentence), shown(name), joint,
-                      shown(fmt::format("{}", fmt::join(names, ", ")), kShownSentence)));
+                      excerpt(file, kShownSentence), excerpt(name), joint,
+                      excerpt(fmt::format("{}", fmt::join(names, ", ")), kShownSentence)));
   return joints;
 }
 

@@ -221,7 +221,7 @@ PeopleFinding<double> find_unit(const RawPeople& people, const SampledPeople& ra
   throw InputError(fmt::format(
       "'{}': cannot tell the unit of length: the bones from head to ankle measure {:.4g} units, which is {} "
       "to {} m in none of metre, CMU unit, inch, centimetre, millimetre; state the metres per unit",
-      shown(people.name), mean, kShortestPerson, kTallestPerson));
+      excerpt(people.name), mean, kShortestPerson, kTallestPerson));
 }
 
 PeopleFinding<Axis> find_up(const RawPeople& people, const SampledPeople& raw, const PeopleOptions& options) {
@@ -236,7 +236,7 @@ PeopleFinding<Axis> find_up(const RawPeople& people, const SampledPeople& raw, c
       return {up, fmt::format("up axis: {} ({})", to_string(up), up_figures(mean))};
     }
   throw InputError(fmt::format("'{}': cannot tell the up axis: {}, expected near one of the axes; state the up axis",
-                               shown(people.name), up_figures(mean)));
+                               excerpt(people.name), up_figures(mean)));
 }
 
 Eigen::Matrix3d rotation_of(Axis up) {
@@ -272,7 +272,7 @@ Axis parse_axis(std::string_view text) {
     const auto axis = static_cast<Axis>(i);
     if (text == to_string(axis) || (i % 2 == 0 && text == to_string(axis).substr(1))) return axis;
   }
-  throw std::invalid_argument(fmt::format("up axis: expected x, y, z, -x, -y or -z, found '{}'", shown(text)));
+  throw std::invalid_argument(fmt::format("up axis: expected x, y, z, -x, -y or -z, found '{}'", excerpt(text)));
 }
 
 PeopleFinding<bool> find_mirror(const SampledPeople& people, const std::array<std::vector<Eigen::Vector3d>, 2>& faces,
@@ -304,7 +304,7 @@ PeopleFinding<Eigen::Matrix3d> find_level(const RawPeople& raw, const SampledPeo
   if (!(tilt < std::acos(kUprightCosine)))
     throw InputError(
         fmt::format("'{}': {}: nobody can stand on it; state the up axis, or that it is not to be levelled",
-                    shown(raw.name), found));
+                    excerpt(raw.name), found));
   const Eigen::Matrix3d R = Eigen::Quaterniond::FromTwoVectors(normal, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   return {R, fmt::format("level: turned by {:.1f} degrees ({}, along {}){}", tilt / kDegree, found,
                          direction_text(normal), options.level ? ", as told" : "")};

@@ -143,15 +143,15 @@ std::vector<std::string> numbered_files(const std::string& folder, std::string_v
     int number = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
     if (error != std::errc() || end != digits.data() + digits.size())
-      throw InputError(
-          fmt::format("'{}': expected files named by the number of the frame, found '{}'", shown(folder), shown(name)));
+      throw InputError(fmt::format("'{}': expected files named by the number of the frame, found '{}'", excerpt(folder),
+                                   excerpt(name)));
     numbered.emplace_back(number, folder + "/" + name);
   }
   std::sort(numbered.begin(), numbered.end());
   std::vector<std::string> files;
   for (std::size_t i = 0; i < numbered.size(); ++i) {
     if (i > 0 && numbered[i].first != numbered[i - 1].first + 1)
-      throw InputError(fmt::format("'{}': after frame {} expected the next one, found {}", shown(folder),
+      throw InputError(fmt::format("'{}': after frame {} expected the next one, found {}", excerpt(folder),
                                    numbered[i - 1].first, numbered[i].first));
     files.push_back(numbered[i].second);
   }
@@ -159,7 +159,7 @@ std::vector<std::string> numbered_files(const std::string& folder, std::string_v
 }
 
 NpyArray read_npy(const std::string& path) {
-  return naming_file(path, [&] { return parse_npy(read_data(path)); });
+  return with_file_context(path, [&] { return parse_npy(read_data(path)); });
 }
 
 std::vector<double> numbers_of(NpyArray array, const std::string& what) {
@@ -194,13 +194,13 @@ const PickleNode& get(const Pickle& pickle, const PickleNode& dict, std::string_
   std::string keys;
   for (std::size_t i = 0; i + 1 < dict.items.size(); i += 2)
     keys += fmt::format("{}{}", keys.empty() ? "" : ", ", pickle[dict.items[i]].text);
-  pickle.fail(dict.offset, fmt::format("no key '{}'; it has: {}", key, shown(keys, kShownSentence)));
+  pickle.fail(dict.offset, fmt::format("no key '{}'; it has: {}", key, excerpt(keys, kShownSentence)));
 }
 
 void refuse_paths(std::span<const std::string> paths, const std::string& expected) {
-  throw InputError(fmt::format("'{}': expected {}, found none",
-                               shown(fmt::format("{}", fmt::join(paths.begin(), paths.end(), "', '")), kShownSentence),
-                               expected));
+  throw InputError(
+      fmt::format("'{}': expected {}, found none",
+                  excerpt(fmt::format("{}", fmt::join(paths.begin(), paths.end(), "', '")), kShownSentence), expected));
 }
 
 }  // namespace duet

@@ -25,7 +25,7 @@ constexpr double kTPoseJump = 5.0,
                  kTPoseJumpMetres = 0.08;  // first step after a T pose: in steps that follow, at least
 
 [[noreturn]] void refuse(const RawPeople& people, const std::string& fault) {
-  throw InputError(fmt::format("'{}': {}", shown(people.name, kShownSentence), fault));
+  throw InputError(fmt::format("'{}': {}", excerpt(people.name, kShownSentence), fault));
 }
 
 void check_sizes(const RawPeople& people) {
@@ -33,7 +33,7 @@ void check_sizes(const RawPeople& people) {
   const auto columns = static_cast<int>(people.layout->names.size());
   for (const PointTracks& joints : people.joints)
     if (joints.points() != columns)
-      refuse(people, fmt::format("expected the {} joints of '{}', found {}", columns, shown(people.layout->name),
+      refuse(people, fmt::format("expected the {} joints of '{}', found {}", columns, excerpt(people.layout->name),
                                  joints.points()));
   const int a = people.joints[0].frames(), b = people.joints[1].frames();
   if (a != b) refuse(people, fmt::format("person A has {} frames and person B {}: expected the same", a, b));
@@ -231,7 +231,7 @@ Task task_for(const RawPeople& people, const PeopleOptions& options) {
   if (people.task) return *people.task;
   const auto label = people.source.find("label");
   if (label == people.source.end()) refuse(people, "nothing says which task it is; state the task");
-  refuse(people, fmt::format("its label '{}' is none of the tasks; state the task", shown(label->second)));
+  refuse(people, fmt::format("its label '{}' is none of the tasks; state the task", excerpt(label->second)));
 }
 
 std::map<std::string, std::string> provenance(const RawPeople& people, const Plan& plan) {
@@ -265,7 +265,7 @@ SourceClip clip_of(const RawPeople& given, const PeopleOptions& options) {
   if (const auto label = given.source.find("label");
       label != given.source.end() && task_of_label(label->second) != task)
     result.evidence.push_back(
-        fmt::format("task: {} (as told; its label is '{}')", to_string(task), shown(label->second)));
+        fmt::format("task: {} (as told; its label is '{}')", to_string(task), excerpt(label->second)));
   std::optional<RawPeople> filled;
   if (const std::string sentence = fill_gaps(given, options.rate_hz.value_or(given.rate_hz), filled); !sentence.empty())
     result.evidence.push_back(sentence);
@@ -298,8 +298,8 @@ SourceClip clip_of(const RawPeople& given, const PeopleOptions& options) {
 namespace {
 
 [[noreturn]] void refuse_gap(const RawPeople& people, int who, int frame, int joint, const std::string& fault) {
-  throw InputError(fmt::format("'{}': person {}, frame {}, joint '{}': {}", shown(people.name, kShownSentence),
-                               who == 0 ? "A" : "B", frame, shown(people.layout->names[joint]), fault));
+  throw InputError(fmt::format("'{}': person {}, frame {}, joint '{}': {}", excerpt(people.name, kShownSentence),
+                               who == 0 ? "A" : "B", frame, excerpt(people.layout->names[joint]), fault));
 }
 
 bool all_finite(const PointTracks& joints) {

@@ -40,7 +40,7 @@ double to_person(const Eigen::Vector3d& hand, const HumanMotion& other, int fram
 // Whether an arm is lost, frame by frame: a quarter of a second on end in the mean, and as long in a wrong place.
 class LostArm {
  public:
-  bool at(bool hidden, const Tracker& tracker, Random& random) {
+  bool at(bool hidden, const TrackerModel& tracker, Random& random) {
     const double rate_hz = tracker.rate_hz, share = tracker.lost_share;
     const Eigen::Vector3d elbow = normal3(random), hand = normal3(random);
     const double length = random.uniform(0.1, 0.4);
@@ -67,7 +67,7 @@ class LostArm {
 using Errors = std::array<Eigen::Vector3d, kColumns.size()>;
 
 // The errors that stay over a clip: a foot that is taken for another place is no lower than the floor.
-Errors misplaced(const Tracker& tracker, Random random) {
+Errors misplaced(const TrackerModel& tracker, Random random) {
   Errors errors;
   errors.fill(Eigen::Vector3d::Zero());
   std::array<Eigen::Vector3d, 2> feet;
@@ -85,8 +85,8 @@ Errors misplaced(const Tracker& tracker, Random random) {
   return errors;
 }
 
-PointTracks seen(const HumanMotion& person, const HumanMotion& other, const Tracker& tracker, int frames, Random random,
-                 const Errors& staying) {
+PointTracks seen(const HumanMotion& person, const HumanMotion& other, const TrackerModel& tracker, int frames,
+                 Random random, const Errors& staying) {
   const double ratio = person.rate_hz / tracker.rate_hz;
   const double keep = std::exp(-1.0 / (tracker.drift_time * tracker.rate_hz)), add = std::sqrt(1.0 - keep * keep);
   PointTracks result(frames, static_cast<int>(kColumns.size()));
@@ -119,7 +119,7 @@ PointTracks seen(const HumanMotion& person, const HumanMotion& other, const Trac
   return result;
 }
 
-void check_tracker(const Tracker& tracker) {
+void check_tracker(const TrackerModel& tracker) {
   require(tracker.rate_hz >= 5.0 && tracker.rate_hz <= 120.0, "tracked clip: expected a rate of 5 to 120 Hz, found {}",
           tracker.rate_hz);
   for (const double value :
@@ -131,7 +131,7 @@ void check_tracker(const Tracker& tracker) {
 
 }  // namespace
 
-InteractionClip tracked(const InteractionClip& clip, const Tracker& tracker, std::uint64_t seed) {
+InteractionClip add_tracker_noise(const InteractionClip& clip, const TrackerModel& tracker, std::uint64_t seed) {
   check_tracker(tracker);
   const int frames = resampled_frames(clip.frames(), clip.rate_hz(), tracker.rate_hz);
   const auto person = [&](const char* who, const HumanMotion& one, const HumanMotion& other) {

@@ -10,7 +10,7 @@
 namespace duet {
 
 // Defaults as found on SBU (docs/synthesis.md).
-struct Tracker {
+struct TrackerModel {
   double rate_hz = 15.0;
   double noise = 0.0015;      // standard deviation of a joint, each axis and frame for itself [m]
   double crowded = 2.5;       // times as much where the two are nearer than kCrowded
@@ -31,6 +31,6 @@ inline constexpr double kCrowded = 0.8;  // between the roots, level [m]
 
 // Phases, contacts, task, reactor and provenance are the clip's own; the id has "-tracked" at its end. At the clip's
 // rate. Throws std::invalid_argument for a rate outside 5 to 120 Hz or a negative figure.
-InteractionClip tracked(const InteractionClip& clip, const Tracker& tracker, std::uint64_t seed);
+InteractionClip add_tracker_noise(const InteractionClip& clip, const TrackerModel& tracker, std::uint64_t seed);
 
 }  // namespace duet

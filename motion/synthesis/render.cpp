@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "duet/motion/synthesis/stage.h"
-#include "duet/tasks/synthesis/figure.h"
+#include "duet/tasks/synthesis/posed_body.h"
 
 namespace duet::synthesis {
 namespace {
@@ -64,7 +64,7 @@ TorsoPose torso_at(const Performer& person, const Performer& partner, double t) 
 
 // Highest pelvis that both legs and the crouch allow.
 double highest_pelvis(const Performer& person, const TorsoPose& torso_at_zero, double t) {
-  Figure figure;
+  PosedBody figure;
   pose_torso(person.body, torso_at_zero, figure);
   const double reach = kLegReach * person.body.leg();
   double highest = person.body.stand_height - person.crouch.at(t);
@@ -95,7 +95,7 @@ std::vector<double> smooth_below(const std::vector<double>& limit, int half) {
 }
 
 std::vector<TorsoPose> pose_torsos(const Performer& person, const Performer& partner, int frames, double rate_hz,
-                                   const Showing& showing) {
+                                   const RenderOptions& showing) {
   std::vector<TorsoPose> torsos(frames);
   std::vector<double> limit(frames);
   for (int i = 0; i < frames; ++i) {
@@ -110,7 +110,7 @@ std::vector<TorsoPose> pose_torsos(const Performer& person, const Performer& par
 }
 
 // Reads no more of the partner than the torso.
-void pose_limbs(const Performer& person, const Body& partner_body, const Figure& partner, double t, Figure& own) {
+void pose_limbs(const Performer& person, const Body& partner_body, const PosedBody& partner, double t, PosedBody& own) {
   // Arms swing against the legs: the left one goes forward with the right foot.
   const double ahead = left_ahead(person, t, own.yaw);
   const double stride = person.arm_swing * std::atan(ahead / (2.0 * person.body.leg()));
@@ -127,7 +127,7 @@ void pose_limbs(const Performer& person, const Body& partner_body, const Figure&
   }
 }
 
-void store(const Figure& figure, int frame, HumanMotion& motion) {
+void store(const PosedBody& figure, int frame, HumanMotion& motion) {
   motion.joints.frame(frame) = figure.p;
   for (const Eigen::Matrix3d& rotation : figure.R)
     motion.rotations.push_back(Eigen::Quaterniond(rotation).normalized());
@@ -136,7 +136,7 @@ void store(const Figure& figure, int frame, HumanMotion& motion) {
 }  // namespace
 
 std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz,
-                                  const Showing& showing) {
+                                  const RenderOptions& showing) {
   std::array<HumanMotion, 2> motions;
   std::array<std::vector<TorsoPose>, 2> torsos;
   for (const int k : {0, 1}) {
@@ -146,7 +146,7 @@ std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int fr
     torsos[k] = pose_torsos(people[k], people[1 - k], frames, rate_hz, showing);
   }
   for (int i = 0; i < frames; ++i) {
-    std::array<Figure, 2> figures;
+    std::array<PosedBody, 2> figures;
     for (const int k : {0, 1}) pose_torso(people[k].body, torsos[k][i], figures[k]);
     for (const int k : {0, 1}) {
       pose_limbs(people[k], people[1 - k].body, figures[1 - k], showing.first + showing.tempo * (i / rate_hz),

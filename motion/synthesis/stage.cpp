@@ -34,8 +34,8 @@ Body draw_body(const std::string& who, std::optional<double> height, Draws& draw
 
 Eigen::Vector2d towards(double yaw) { return {std::cos(yaw), std::sin(yaw)}; }
 
-Ways plan_ways(const Layout& layout, double distance, double angle, double share) {
-  Ways ways;
+ApproachPaths plan_ways(const Layout& layout, double distance, double angle, double share) {
+  ApproachPaths ways;
   const double way_a = share * (distance - layout.distance);
   ways.start[0] = {Eigen::Vector2d::Zero(), 0.0};
   ways.act[0] = {way_a * towards(0.5 * angle), angle};
@@ -120,8 +120,8 @@ struct Timing {
   }
 };
 
-Timing plan_timing(const Act& act, const Scene& scene, const Ways& ways, std::array<double, 2> speed, bool brief,
-                   Draws& draws) {
+Timing plan_timing(const Act& act, const Scene& scene, const ApproachPaths& ways, std::array<double, 2> speed,
+                   bool brief, Draws& draws) {
   Timing timing;
   timing.reaction[1] = draws.uniform("b.reaction", 0.18, 0.42);
   const double later_start = draws.uniform("b.starts_later", 0.0, 0.7);
@@ -161,7 +161,7 @@ double draw_seconds(const Act& act, const SynthesisOptions& options, Draws& draw
 
 }  // namespace
 
-Performer make_performer(const Body& body, const Ways& ways, int k, double style, Draws& draws) {
+Performer make_performer(const Body& body, const ApproachPaths& ways, int k, double style, Draws& draws) {
   const std::string who(kWho[k]);
   const double outward = draws.uniform(who + "arms.outward", 0.10, 0.17);
   const double upright = draws.uniform(who + "arms.plumb", 0.3, 1.0);
@@ -183,7 +183,7 @@ void give_ways(Performer& person, const Timing& timing, int k, const Clock& cloc
 
 }  // namespace
 
-Staged set_stage(Task task, const SynthesisOptions& options, Draws& draws) {
+PlannedScene set_stage(Task task, const SynthesisOptions& options, Draws& draws) {
   const Act& act = definition_of(task).act;
   const double distance = draws.uniform("distance", 2.4, 4.2, options.distance);
   const double angle = draws.uniform("angle", -30.0 * kDegree, 30.0 * kDegree, options.angle);
@@ -191,7 +191,7 @@ Staged set_stage(Task task, const SynthesisOptions& options, Draws& draws) {
   const std::optional<bool> left =
       options.side ? std::optional<bool>(*options.side == Side::kLeft) : std::optional<bool>();
 
-  Cast cast;
+  Participants cast;
   cast.body = {draw_body("a.", options.height_a, draws), draw_body("b.", options.height_b, draws)};
   cast.side = draws.chance("left_handed", 0.15, left) ? 0 : 1;
   cast.style = draws.uniform("style", 0.0, 1.0, options.style);
@@ -200,7 +200,7 @@ Staged set_stage(Task task, const SynthesisOptions& options, Draws& draws) {
   const Layout layout = act.layout(cast, draws);
   draws.record("act.distance", layout.distance);
 
-  const Ways ways = plan_ways(layout, distance, angle, draws.uniform("a.share_of_way", 0.4, 0.6));
+  const ApproachPaths ways = plan_ways(layout, distance, angle, draws.uniform("a.share_of_way", 0.4, 0.6));
   Scene scene{cast,
               layout,
               {make_performer(cast.body[0], ways, 0, cast.style, draws),
@@ -251,11 +251,11 @@ Hold half_way() { return from_shoulder({0.55, -0.02, -0.35}, {-0.4, 0.45, -1.0},
 
 bool stretches_arms(Task task) { return task != Task::kBend; }
 
-Cast draw_cast(Task task, const SynthesisOptions& options, Draws& draws) {
+Participants draw_cast(Task task, const SynthesisOptions& options, Draws& draws) {
   const RecordedManner& recorded = definition_of(task).act.recorded;
   const std::optional<bool> left =
       options.side ? std::optional<bool>(*options.side == Side::kLeft) : std::optional<bool>();
-  Cast cast;
+  Participants cast;
   cast.body = {draw_body("a.", options.height_a, draws, kShortestArms, kLongestArms),
                draw_body("b.", options.height_b, draws, kShortestArms, kLongestArms)};
   cast.side = draws.chance("left_handed", recorded.left, left) ? 0 : 1;
@@ -283,8 +283,8 @@ double draw_act(const Act& act, double tempo, Draws& draws) {
 
 // The four ends of the two ways, the middle between the two in the act at the origin: each comes straight to its place,
 // from where it has turned by half of `angle`.
-Ways people_ways(const Layout& layout, double way, double angle, double share) {
-  Ways ways;
+ApproachPaths people_ways(const Layout& layout, double way, double angle, double share) {
+  ApproachPaths ways;
   ways.act[1] = {Eigen::Vector2d(layout.distance, layout.lateral), std::numbers::pi + layout.turn};
   for (Placement& place : ways.act) place.position -= 0.5 * Eigen::Vector2d(layout.distance, layout.lateral);
   for (const int k : {0, 1}) {
@@ -350,7 +350,7 @@ ActOutcome draw_outcome(const SynthesisOptions& options, Draws& draws) {
 }
 
 // Crops the clip as recordings are, or to the time asked for before the first step and after the last.
-void crop(const Act& act, const SynthesisOptions& options, double last, Staged& staged, Draws& draws) {
+void crop(const Act& act, const SynthesisOptions& options, double last, PlannedScene& staged, Draws& draws) {
   const Scene& scene = staged.scene;
   const double tempo = scene.cast.manner.tempo;
   const double touch = scene.act_begin + act.recorded.until_touch;
@@ -365,9 +365,9 @@ void crop(const Act& act, const SynthesisOptions& options, double last, Staged& 
 
 }  // namespace
 
-Staged set_people_stage(Task task, const SynthesisOptions& options, Draws& draws, ActOutcome& outcome) {
+PlannedScene set_people_stage(Task task, const SynthesisOptions& options, Draws& draws, ActOutcome& outcome) {
   const Act& act = definition_of(task).act;
-  Cast cast = draw_cast(task, options, draws);
+  Participants cast = draw_cast(task, options, draws);
   const double tempo = cast.manner.tempo;
   const Layout layout = act.layout(cast, draws);
   const double roots = std::hypot(layout.distance, layout.lateral);
@@ -375,18 +375,18 @@ Staged set_people_stage(Task task, const SynthesisOptions& options, Draws& draws
   const double drawn_way = std::max(0.0, draws.spread("way", act.recorded.way));
   const double way = options.distance ? std::max(0.0, *options.distance - roots) : drawn_way;
   const double angle = draws.uniform("angle", -0.15, 0.15, options.angle);
-  Ways ways = people_ways(layout, way, angle, draw_share(act.recorded.stands, draws));
+  ApproachPaths ways = people_ways(layout, way, angle, draw_share(act.recorded.stands, draws));
   for (const int k : {0, 1})
     if ((ways.act[k].position - ways.start[k].position).norm() < kShortestStep) ways.start[k] = ways.act[k];
 
-  Staged staged{.scene = Scene{cast,
-                               layout,
-                               {make_performer(cast.body[0], ways, 0, cast.style, draws),
-                                make_performer(cast.body[1], ways, 1, cast.style, draws)},
-                               0.0,
-                               0.0,
-                               0.0,
-                               {}}};
+  PlannedScene staged{.scene = Scene{cast,
+                                     layout,
+                                     {make_performer(cast.body[0], ways, 0, cast.style, draws),
+                                      make_performer(cast.body[1], ways, 1, cast.style, draws)},
+                                     0.0,
+                                     0.0,
+                                     0.0,
+                                     {}}};
   Scene& scene = staged.scene;
   const double speed = options.speed.value_or(std::max(0.3, draws.spread("speed", act.recorded.speed)));
   const double later = draws.uniform("b.starts_later", 0.0, 0.3) * tempo;

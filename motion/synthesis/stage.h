@@ -15,23 +15,23 @@ namespace duet::synthesis {
 // frame.
 
 // The part of the scene's time that a clip shows: from `first` on, `tempo` seconds of it in each second of the clip.
-struct Showing {
+struct RenderOptions {
   double first = 0.0;  // [s]
   double tempo = 1.0;
 };
 
 std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz,
-                                  const Showing& showing = {});
+                                  const RenderOptions& showing = {});
 
-struct Staged {
+struct PlannedScene {
   Scene scene;
   int frames = 0;
-  Showing showing = {};
+  RenderOptions showing = {};
 };
 
 // Draws what `options` (already checked) leaves open and plans everything but the act's gestures. Throws
 // std::invalid_argument where a duration was asked for that is too short for the ways and the act.
-Staged set_stage(Task task, const SynthesisOptions& options, Draws& draws);
+PlannedScene set_stage(Task task, const SynthesisOptions& options, Draws& draws);
 
 // A body of the stature given or drawn, its arms drawn as a share of the usual ones.
 Body draw_body(const std::string& who, std::optional<double> height, Draws& draws, double shortest_arms = 0.97,
@@ -41,14 +41,14 @@ Body draw_body(const std::string& who, std::optional<double> height, Draws& draw
 Eigen::Vector2d towards(double yaw);
 
 // The four ends of the two ways. The middle between the two in the act is the origin, A sets out along +x.
-struct Ways {
+struct ApproachPaths {
   std::array<Placement, 2> start, act;
 };
-Ways plan_ways(const Layout& layout, double distance, double angle, double share);
+ApproachPaths plan_ways(const Layout& layout, double distance, double angle, double share);
 
 // A step or two backwards, beginning at 0. `by` [m].
 Walk step_back(const Body& body, const Placement& from, double speed, double by);
-Performer make_performer(const Body& body, const Ways& ways, int k, double style, Draws& draws);
+Performer make_performer(const Body& body, const ApproachPaths& ways, int k, double style, Draws& draws);
 
 // Makes people who turn round to leave stop looking at the partner; to be called once the act has been performed.
 void look_away(Scene& scene);
@@ -58,7 +58,7 @@ void look_away(Scene& scene);
 
 // Draws what `options` (already checked) leaves open and plans everything but the act's gestures; who hesitates does so
 // here. `outcome` says how the act ends.
-Staged set_people_stage(Task task, const SynthesisOptions& options, Draws& draws, ActOutcome& outcome);
+PlannedScene set_people_stage(Task task, const SynthesisOptions& options, Draws& draws, ActOutcome& outcome);
 
 // In place of the act's gestures: A, and perhaps B, reaches half way and draws back.
 void perform_abort(Scene& scene, Draws& draws);

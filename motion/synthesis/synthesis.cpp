@@ -14,8 +14,8 @@ namespace {
 
 using synthesis::Act;
 using synthesis::Draws;
+using synthesis::PlannedScene;
 using synthesis::Scene;
-using synthesis::Staged;
 
 constexpr const char* kGenerator = "generator";  // of a clip's source
 constexpr const char* kSynthesis = "synthesis";
@@ -55,7 +55,7 @@ void check_synthesis_options(Task task, const SynthesisOptions& options) {
 namespace {
 
 // The contact windows that the clip shows, as far as it does.
-std::vector<ContactWindow> windows(const Staged& staged, double rate_hz) {
+std::vector<ContactWindow> windows(const PlannedScene& staged, double rate_hz) {
   const auto index = [&](double t) { return (t - staged.showing.first) / staged.showing.tempo * rate_hz; };
   std::vector<ContactWindow> found;
   for (const synthesis::Touch& touch : staged.scene.touches) {
@@ -66,7 +66,7 @@ std::vector<ContactWindow> windows(const Staged& staged, double rate_hz) {
   return found;
 }
 
-Phases phases_of(const Staged& staged, double rate_hz) {
+Phases phases_of(const PlannedScene& staged, double rate_hz) {
   const auto frame = [&](double t) {
     return static_cast<int>(std::lround((t - staged.showing.first) / staged.showing.tempo * rate_hz));
   };
@@ -82,7 +82,7 @@ InteractionClip synthesize(Task task, const SynthesisOptions& options) {
   const bool people = options.like == Likeness::kPeople;
   Draws draws(options.seed, task, options.index);
   ActOutcome outcome = ActOutcome::kComplete;
-  Staged staged = people ? set_people_stage(task, options, draws, outcome) : set_stage(task, options, draws);
+  PlannedScene staged = people ? set_people_stage(task, options, draws, outcome) : set_stage(task, options, draws);
   if (outcome == ActOutcome::kAborted)
     perform_abort(staged.scene, draws);
   else

@@ -45,7 +45,7 @@ Mlp one_mlp(const SafeTensors& content, const std::string& file) {
     if (name.ends_with(kFirst)) prefixes.push_back(name.substr(0, name.size() - kFirst.size()));
   if (prefixes.size() != 1)
     throw InputError(fmt::format("'{}': expected one multilayer perceptron ('<name>.0.weight'), found {} [{}]", file,
-                                 prefixes.size(), shown(fmt::format("{}", fmt::join(prefixes, ", ")))));
+                                 prefixes.size(), excerpt(fmt::format("{}", fmt::join(prefixes, ", ")))));
   return read_mlp(content, prefixes[0], file);
 }
 

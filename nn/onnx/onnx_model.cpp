@@ -67,7 +67,7 @@ class Parser {
 
  private:
   [[noreturn]] void refuse(const std::string& problem) const {
-    throw InputError(fmt::format("'{}': {}", graph_.file, shown(problem, kShownSentence)));
+    throw InputError(fmt::format("'{}': {}", graph_.file, excerpt(problem, kShownSentence)));
   }
 
   [[nodiscard]] int opset(const onnx::ModelProto& model) const {
@@ -128,7 +128,7 @@ class Parser {
   [[nodiscard]] TensorProto with_external_bytes(const TensorProto& from, const std::string& place) const {
     if (external_.folder().empty())
       refuse(place + ": expected its numbers in the file, found them in another (external data)");
-    const std::string where = fmt::format("'{}': {}", graph_.file, shown(place));
+    const std::string where = fmt::format("'{}': {}", graph_.file, excerpt(place));
     TensorProto tensor = from;
     tensor.set_raw_data(external_.read(external_place(from, place), where));
     return tensor;
@@ -145,7 +145,7 @@ class Parser {
         at.length = byte_count(entry.value(), place);
       else if (entry.key() != "checksum")  // optional, and the run's own digest covers the file
         refuse(fmt::format("{}: external data: expected location, offset, length or checksum, found '{}'", place,
-                           shown(entry.key())));
+                           excerpt(entry.key())));
     }
     return at;
   }
@@ -154,7 +154,7 @@ class Parser {
     std::int64_t count = -1;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
     if (error != std::errc() || end != text.data() + text.size() || count < 0)
-      refuse(fmt::format("{}: external data: expected a number of bytes, found '{}'", place, shown(text)));
+      refuse(fmt::format("{}: external data: expected a number of bytes, found '{}'", place, excerpt(text)));
     return count;
   }
 
@@ -290,20 +290,20 @@ bool is_below(const fs::path& folder, const fs::path& file) {
 std::string location_fault(const std::string& folder, const std::string& location) {
   const fs::path path(location);
   if (location.empty() || location.find('\0') != std::string::npos || path.is_absolute() || climbs(path))
-    return fmt::format("expected external data at a path below the model's folder, found '{}'", shown(location));
+    return fmt::format("expected external data at a path below the model's folder, found '{}'", excerpt(location));
   const fs::path file = fs::path(folder) / path;
   if (!is_below(folder, file))
     return fmt::format("expected external data in the model's folder, found that '{}' leads out of it",
-                       shown(location));
+                       excerpt(location));
   std::error_code ignored;
   if (!fs::is_regular_file(file, ignored))
-    return fmt::format("expected external data in the file '{}', found none", shown(file.string()));
+    return fmt::format("expected external data in the file '{}', found none", excerpt(file.string()));
   return "";
 }
 
 std::string ExternalData::read(const ExternalPlace& place, const std::string& where) {
   const auto refuse = [&](const std::string& problem) {
-    throw InputError(fmt::format("{}: {}", where, shown(problem, kShownSentence)));
+    throw InputError(fmt::format("{}: {}", where, excerpt(problem, kShownSentence)));
   };
   if (const std::string fault = location_fault(folder_, place.location); !fault.empty()) refuse(fault);
   auto found = files_.find(place.location);

@@ -57,8 +57,8 @@ OnnxValue input_value(OnnxPlan& plan, const OnnxPort& port, const std::string& f
   for (std::int64_t& size : value.shape) size = std::abs(size);  // -1, an open size, becomes 1
   value.data = plan.arena.take(value.count());
   if (value.data == nullptr)
-    throw InputError(
-        fmt::format("'{}': input '{}': shape {} is too large", file, shown(port.name), shown(shape_text(value.shape))));
+    throw InputError(fmt::format("'{}': input '{}': shape {} is too large", file, excerpt(port.name),
+                                 excerpt(shape_text(value.shape))));
   return value;
 }
 
@@ -98,8 +98,8 @@ OnnxBuilder::OnnxBuilder(OnnxPlan& plan, const OnnxGraph& graph, const OnnxNode&
     : plan_(plan), graph_(graph), node_(node) {}
 
 void OnnxBuilder::refuse(const std::string& problem) const {
-  throw InputError(fmt::format("'{}': node '{}', operator {}: {}", graph_.file, shown(node_.name), shown(node_.op),
-                               shown(problem, kShownSentence)));
+  throw InputError(fmt::format("'{}': node '{}', operator {}: {}", graph_.file, excerpt(node_.name), excerpt(node_.op),
+                               excerpt(problem, kShownSentence)));
 }
 
 bool OnnxBuilder::has_input(int i) const { return i < input_count() && !node_.inputs[i].empty(); }
@@ -240,11 +240,11 @@ std::unique_ptr<OnnxPlan> plan_onnx(const OnnxGraph& graph) {
     plan->values.emplace(name, constant_value(*plan, tensor, graph.file));
   for (const OnnxPort& port : graph.inputs)
     if (!plan->values.emplace(port.name, input_value(*plan, port, graph.file)).second)
-      throw InputError(fmt::format("'{}': input '{}' stands in the file twice", graph.file, shown(port.name)));
+      throw InputError(fmt::format("'{}': input '{}' stands in the file twice", graph.file, excerpt(port.name)));
   for (const OnnxNode& node : graph.nodes) build(*plan, graph, node);
   for (const OnnxPort& port : graph.outputs)
     if (!plan->values.contains(port.name))
-      throw InputError(fmt::format("'{}': output '{}': no node gives it", graph.file, shown(port.name)));
+      throw InputError(fmt::format("'{}': output '{}': no node gives it", graph.file, excerpt(port.name)));
   return plan;
 }
 

@@ -40,7 +40,7 @@ void take(TorchArchive& archive, const std::string& entry, const std::string& co
 }  // namespace
 
 void TorchArchive::refuse(const std::string& problem) const {
-  throw InputError(fmt::format("'{}': TorchScript: {}", file, shown(problem, kShownSentence)));
+  throw InputError(fmt::format("'{}': TorchScript: {}", file, excerpt(problem, kShownSentence)));
 }
 
 bool holds_torch_code(std::string_view bytes, const std::string& file) {

@@ -113,10 +113,10 @@ class GraphReader {
     archive_.refuse(
         fmt::format("expected a policy of linear, recurrent and normalising layers, found {} (TorchScript of another "
                     "kind; needs libtorch)",
-                    shown(found, kShownSentence)));
+                    excerpt(found, kShownSentence)));
   }
   [[noreturn]] void refuse_line(const std::string& line, const std::string& path) const {
-    refuse(fmt::format("the line '{}' in the code of '{}'", shown(line), path));
+    refuse(fmt::format("the line '{}' in the code of '{}'", excerpt(line), path));
   }
 
   OnnxNode& add(const std::string& name, std::string_view op, std::vector<std::string> inputs, std::string output) {
@@ -573,7 +573,7 @@ class GraphReader {
     if (found == frame.object.members.end()) {
       if (const std::optional<double> number = find_number(frame.object, name))
         return {.kind = Value::Kind::kNumber, .number = *number};
-      refuse(fmt::format("no member '{}' in '{}' (the line '{}')", name, frame.path, shown(line)));
+      refuse(fmt::format("no member '{}' in '{}' (the line '{}')", name, frame.path, excerpt(line)));
     }
     const TorchNode& node = pickle_.nodes[found->second];
     if (node.kind == TorchKind::kNone) return {};

@@ -15,8 +15,8 @@
 #include "duet/core/machine.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/experiment/plan/bodies.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/plan/embodiments.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/parts/cluster/part.h"
 #include "duet/rows/folder/run_directory.h"
 
@@ -90,7 +90,7 @@ void run_plan(Session& session, PlanArguments arguments) {
   arguments.options.argv = session.argv;
   if (!arguments.certificate.empty())
     arguments.options.certificate = certificate_json(load_certificate(arguments.certificate));
-  const StopSign stop(0.0, session.begin);
+  const StopToken stop(0.0, session.begin);
   Progress progress(session.progress());
   try {
     const PlanSummary summary = plan_run(suite, arguments.output, arguments.options, stop, progress);

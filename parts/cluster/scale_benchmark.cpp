@@ -69,7 +69,7 @@ class ScaleRun {
  private:
   ScratchFolder folder_;
   Suite suite_;
-  StopSign stop_;
+  StopToken stop_;
   Progress quiet_{Progress::Style::kQuiet};
 };
 

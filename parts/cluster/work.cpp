@@ -12,7 +12,7 @@
 #include "duet/cluster/work_shard.h"
 #include "duet/core/file.h"
 #include "duet/experiment/work/run_work.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/parts/cluster/part.h"
 
 namespace duet::cli {
@@ -58,8 +58,8 @@ std::string text_of(const WorkSummary& summary, const WorkArguments& arguments) 
 
 void run_work(Session& session, const WorkArguments& arguments) {
   catch_interrupts();
-  const StopSign stop(arguments.time_limit, session.begin);
-  const StopWatch watch(stop, kWorkGrace, leave_at_once);
+  const StopToken stop(arguments.time_limit, session.begin);
+  const Watchdog watch(stop, kWorkGrace, leave_at_once);
   Progress progress(session.progress());
   try {
     const WorkSummary summary = work_shard(arguments.run, arguments.shard, arguments.options, stop, progress);

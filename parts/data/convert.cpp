@@ -89,7 +89,7 @@ ConvertedMotion convert_motion(const std::string& input, const std::string& outp
                                const ConversionOptions& options) {
   const MotionSource source = open_motion_source(input);
   if (options.sim_to_real || options.to == kPaired)
-    return naming_file(input, [&] { return convert_paired(source, output, robot, options); });
+    return with_file_context(input, [&] { return convert_paired(source, output, robot, options); });
   const RobotMotionFormat& format = robot_motion_format(options.to);
   RobotMotionFile read = read_robot_motion(source, robot, options.reading, options.from);
   if (read.format == kPaired) read.evidence.emplace_back("the partner stays behind: robot motions hold no person");

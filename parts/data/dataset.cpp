@@ -18,7 +18,7 @@
 #include "duet/datasets/interaction_tables.h"
 #include "duet/datasets/people_clip.h"
 #include "duet/experiment/plan/clips.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/plausibility.h"

@@ -38,7 +38,7 @@ struct HardwareArguments {
   ClipEpisodeArguments episode;
 };
 
-// Not experiment/work/stop_sign.h: there a second Ctrl-C ends the program at once, and a guard that is damping has to
+// Not experiment/work/stop_token.h: there a second Ctrl-C ends the program at once, and a guard that is damping has to
 // finish.
 void end_on_signals() {
   asked_to_end = 0;

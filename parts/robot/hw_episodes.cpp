@@ -16,7 +16,7 @@
 #include "duet/experiment/plan/shipped_suites.h"
 #include "duet/experiment/suite_file/suite_actors.h"
 #include "duet/experiment/work/run_work.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/hardware/dds/twin_over_dds.h"
 #include "duet/hardware/episodes/guarded_episode.h"
 #include "duet/hardware/twin/lock_step.h"
@@ -77,7 +77,7 @@ class TwinEpisodes {
     const ControllerOnBody& body = experiment_.bodies().controller(walker_.name);
     if (!body.refusal.empty()) throw MissingError(body.refusal);
     make_walker_ = Walker::load(walker_.use, walker_.options, body.robot);
-    const KeptSuite kept = kept_suite(experiment_.suite(), arguments.output, experiment_.identity().files);
+    const ArchivedSuite kept = archive_inputs(experiment_.suite(), arguments.output, experiment_.identity().files);
     rows_.emplace(RunDirectory::open(arguments.output, new_run_info(experiment_, kept, session.argv, {})));
     keep_inputs(kept, arguments.output);
   }

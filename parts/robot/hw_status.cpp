@@ -5,7 +5,7 @@
 
 #include "duet/hardware/guard/guard_loop.h"
 #include "duet/hardware/guard/robot_connection.h"
-#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/twin/fakes.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/parts/robot/hw.h"
 

@@ -10,7 +10,7 @@
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/experiment/plan/shipped_suites.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/parts/training/part.h"
 #include "duet/policies/dstar/network.h"
 #include "duet/robots/robot_model.h"

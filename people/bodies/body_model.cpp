@@ -15,7 +15,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/people/bodies/number_table.h"
-#include "duet/tasks/synthesis/figure.h"
+#include "duet/tasks/synthesis/posed_body.h"
 
 namespace duet {
 namespace {
@@ -236,7 +236,7 @@ std::optional<BodyModel> with_joints(const std::string& path, std::string_view b
 
 BodyModel load_body_model(const std::string& path) {
   const FileMark mark = mark_of(path);
-  const std::string name = shown(std::filesystem::path(path).filename().string());
+  const std::string name = excerpt(std::filesystem::path(path).filename().string());
   if (std::optional<BodyModel> model = kept(path, mark)) {
     model->note = fmt::format("body model: {} of '{}' (joints kept beside it)", model->kind, name);
     return *std::move(model);

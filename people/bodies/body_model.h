@@ -39,7 +39,7 @@ struct BodyModel {
 // and found.
 BodyModel load_body_model(const std::string& path);
 
-// A person of 1.70 m with the proportions of duet's synthesis (tasks/synthesis/figure.h). Its pelvis rests at the
+// A person of 1.70 m with the proportions of duet's synthesis (tasks/synthesis/posed_body.h). Its pelvis rests at the
 // origin, since where a model's pelvis lies is known from its file alone: people of one file are all moved by the same
 // 0.2 to 0.4 m along the file's axes.
 BodyModel average_body();

@@ -44,7 +44,7 @@ void NumberTable::fail(const std::string& fault) const { throw InputError(what +
 std::string NumberTable::found() const { return shape_text(shape); }
 
 NumberTable table_of(const Npz& npz, const std::string& key) {
-  return table_of(npz.array(key), fmt::format("'{}': array '{}'", npz.name(), shown(key)));
+  return table_of(npz.array(key), fmt::format("'{}': array '{}'", npz.name(), excerpt(key)));
 }
 
 NumberTable table_of(const Pickle& pickle, const PickleNode& node, const std::string& what) {

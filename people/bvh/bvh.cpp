@@ -98,7 +98,7 @@ class Words {
     const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (error == std::errc::result_out_of_range || (error == std::errc() && !std::isfinite(value)))
-      fail(fmt::format("{}: '{}' is not finite", what, shown(word, kShownWord)));
+      fail(fmt::format("{}: '{}' is not finite", what, excerpt(word, kShownWord)));
     if (word.empty() || error != std::errc() || end != digits.data() + digits.size())
       fail(fmt::format("{}: expected a number, found {}", what, found(word)));
     return value;
@@ -108,10 +108,10 @@ class Words {
     if (!same(word, expected)) fail(fmt::format("{}: expected '{}', found {}", where, expected, found(word)));
   }
   [[noreturn]] void fail(const std::string& fault) const {
-    throw InputError(fmt::format("{}:{}: {}", name_, line_, shown(fault, kShownSentence)));
+    throw InputError(fmt::format("{}:{}: {}", name_, line_, excerpt(fault, kShownSentence)));
   }
   static std::string found(std::string_view word) {
-    return word.empty() ? "the end of the text" : fmt::format("'{}'", shown(word, kShownWord));
+    return word.empty() ? "the end of the text" : fmt::format("'{}'", excerpt(word, kShownWord));
   }
 
  private:
@@ -163,7 +163,7 @@ void read_channels(Words& words, BvhJoint& joint) {
     if (known == kChannelNames.end()) words.fail(where + ": " + channel_fault(word));
     const int channel = static_cast<int>(known - kChannelNames.begin());
     if (std::find(joint.channels.begin(), joint.channels.end(), channel) != joint.channels.end())
-      words.fail(fmt::format("{}: '{}' is there twice", where, shown(word, kShownWord)));
+      words.fail(fmt::format("{}: '{}' is there twice", where, excerpt(word, kShownWord)));
     joint.channels.push_back(channel);
   }
 }
@@ -221,9 +221,9 @@ class HierarchyReader {
     if (name.empty()) words_.fail("expected the name of a joint, found " + Words::found(words_.next()));
     const auto has_name = [&](const BvhJoint& joint) { return joint.name == name; };
     if (std::any_of(joints_.begin() + static_cast<std::ptrdiff_t>(root_), joints_.end(), has_name))
-      words_.fail(fmt::format("joint '{}' is there twice", shown(name, kShownWord)));
+      words_.fail(fmt::format("joint '{}' is there twice", excerpt(name, kShownWord)));
     if (joints_.size() >= kMostJoints) words_.fail(fmt::format("more than {} joints", kMostJoints));
-    words_.expect("{", "joint '" + shown(name, kShownWord) + "'");
+    words_.expect("{", "joint '" + excerpt(name, kShownWord) + "'");
     const int parent = open_.empty() ? -1 : open_.back().index;
     open_.push_back({.index = static_cast<int>(joints_.size()), .end_site = end_site});
     joints_.push_back({.name = name, .parent = parent, .offset = Eigen::Vector3d::Zero(), .channels = {}});

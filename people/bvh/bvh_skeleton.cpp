@@ -49,8 +49,8 @@ class JointFinder {
     const std::string nearest = closest_name(alternatives.front(), names_);
     throw InputError(
         fmt::format("'{}': no joint '{}' (for {}); {}", bvh_.name, fmt::join(alternatives, "' or '"), kSmplNames[joint],
-                    nearest.empty() ? shown(fmt::format("joints found: {}", fmt::join(names_, ", ")), kShownSentence)
-                                    : fmt::format("nearest found: '{}'", shown(nearest))));
+                    nearest.empty() ? excerpt(fmt::format("joints found: {}", fmt::join(names_, ", ")), kShownSentence)
+                                    : fmt::format("nearest found: '{}'", excerpt(nearest))));
   }
 
  private:

@@ -84,7 +84,7 @@ RawPeople read_clip_people(const ClipPlace& place, const PeopleOptions& options)
 SourceClip take_clip(const ClipPlace& place, const PeopleOptions& options) {
   check_clip_options(options);
   const Npz npz = Npz::load(place.files.at(0));
-  ForeignClip read = read_foreign_clip(npz, options.as_is ? Implausible::kTaken : Implausible::kRefused);
+  ImportedClip read = read_foreign_clip(npz, options.as_is ? Implausible::kAllowed : Implausible::kRefused);
   if (read.clip.rate_hz() != options.output_rate_hz) return clip_of(people_of(std::move(read.clip), place), options);
   SourceClip result{.clip = std::move(read.clip), .evidence = {"a clip of duet, taken as it is"}};
   for (const std::string& note : read.notes) result.evidence.push_back("not as expected: " + note);

@@ -79,7 +79,7 @@ class NtuLines {
   NtuLines(std::string_view text, const std::string& name) : rest_(text), name_(name) {}
 
   [[noreturn]] void fail(const std::string& fault) const {
-    throw InputError(fmt::format("'{}': line {}: {}", shown(name_, kShownSentence), number_, fault));
+    throw InputError(fmt::format("'{}': line {}: {}", excerpt(name_, kShownSentence), number_, fault));
   }
 
   // The fields of the next line that has any.
@@ -99,7 +99,7 @@ class NtuLines {
   double number(std::string_view field) const {
     if (const std::optional<double> value = parse_number(field)) return *value;
     if (field == "nan" || field == "NaN") return std::numeric_limits<double>::quiet_NaN();
-    fail(fmt::format("expected a number, found '{}'", shown(field)));
+    fail(fmt::format("expected a number, found '{}'", excerpt(field)));
   }
 
   int count(const char* what, int most) {
@@ -146,7 +146,7 @@ std::vector<NtuBody> read_bodies(const std::string& text, const std::string& nam
 std::array<NtuBody, 2> two_of(std::vector<NtuBody> bodies, const std::string& name) {
   if (bodies.size() < 2)
     throw InputError(fmt::format("'{}': expected two people, found {} (an action of one person?)",
-                                 shown(name, kShownSentence), bodies.size()));
+                                 excerpt(name, kShownSentence), bodies.size()));
   while (bodies.size() > 2) {  // the shortest, the last of several
     const auto shortest = std::min_element(bodies.rbegin(), bodies.rend(), [](const NtuBody& a, const NtuBody& b) {
       return a.poses.size() < b.poses.size();
@@ -176,7 +176,7 @@ RawPeople read_ntu(const ClipPlace& place, const PeopleOptions& /*options*/) {
   const int first = std::max(two[0].poses.begin()->first, two[1].poses.begin()->first);
   const int last = std::min(two[0].poses.rbegin()->first, two[1].poses.rbegin()->first);
   if (last <= first)
-    throw InputError(fmt::format("'{}': the two people are never seen at once", shown(file, kShownSentence)));
+    throw InputError(fmt::format("'{}': the two people are never seen at once", excerpt(file, kShownSentence)));
   RawPeople people{.id = place.id, .name = file, .layout = &joint_layout("ntu-25"), .joints = {}};
   for (const std::size_t who : {0U, 1U}) {
     people.joints[who] = PointTracks(last - first + 1, kNtuJoints);
@@ -188,7 +188,7 @@ RawPeople read_ntu(const ClipPlace& place, const PeopleOptions& /*options*/) {
   people.rate_hz = kNtuRate;
   people.metres_per_unit = 1.0;
   people.evidence.push_back(
-      fmt::format("people: bodies {} and {}{}, both in frames {} to {}", shown(two[0].id), shown(two[1].id),
+      fmt::format("people: bodies {} and {}{}, both in frames {} to {}", excerpt(two[0].id), excerpt(two[1].id),
                   found > 2 ? fmt::format(" of {}, which are seen longest", found) : "", first, last));
   people.source = {{"format", "ntu"}, {"file_a", file}};
   if (const std::string label = ntu_label(stem_of(file)); !label.empty()) {

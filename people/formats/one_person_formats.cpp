@@ -29,7 +29,7 @@ bool is_amass_name(const std::string& name) {
   throw InputError(
       fmt::format("'{}': a stage-i file holds a subject's shape and no motion: expected the "
                   "'_stageii.npz' or '_poses.npz' beside it",
-                  shown(path)));
+                  excerpt(path)));
 }
 
 bool is_amass_archive(const std::string& path) {
@@ -79,8 +79,8 @@ AmassPerson read_amass_person(const std::string& path) {
     if (!npz.contains(key)) continue;
     person.rate_hz = npz.number_or_text(key);
     if (!(person.rate_hz > 0.0 && person.rate_hz <= 10'000.0))
-      throw InputError(fmt::format("'{}': array '{}': expected a rate of at most 10000 Hz, found {}", shown(path), key,
-                                   person.rate_hz));
+      throw InputError(fmt::format("'{}': array '{}': expected a rate of at most 10000 Hz, found {}", excerpt(path),
+                                   key, person.rate_hz));
     break;
   }
   return person;
@@ -91,12 +91,12 @@ RawPeople read_amass(const ClipPlace& place, const PeopleOptions& options) {
   if (a.rate_hz == 0.0 || b.rate_hz == 0.0) {
     if (!options.rate_hz)
       throw InputError(fmt::format("'{}': it states no rate (no array 'mocap_framerate'); state the rate",
-                                   shown(place.files[a.rate_hz == 0.0 ? 0 : 1])));
+                                   excerpt(place.files[a.rate_hz == 0.0 ? 0 : 1])));
     a.rate_hz = b.rate_hz = *options.rate_hz;
   }
   if (a.rate_hz != b.rate_hz)
     throw InputError(fmt::format("'{}' is at {:g} Hz and '{}' at {:g} Hz: expected two people at the same rate",
-                                 shown(place.files[0]), a.rate_hz, shown(place.files[1]), b.rate_hz));
+                                 excerpt(place.files[0]), a.rate_hz, excerpt(place.files[1]), b.rate_hz));
   RawPeople raw{.id = place.id, .name = place.files[0], .joints = {}};
   raw.rate_hz = a.rate_hz;
   raw.up = Axis::kPlusZ;
@@ -150,10 +150,11 @@ BodyMotion read_gvhmr_person(const std::string& path) {
   const PickleNode* parameters = pickle.find(pickle[pickle.root], kGvhmrKey);
   if (parameters == nullptr || parameters->kind != PickleKind::kDict)
     throw InputError(fmt::format("'{}': expected a dict with the key '{}' (GVHMR's hmr4d_results.pt), found {}",
-                                 shown(path), kGvhmrKey, parameters == nullptr ? "none" : to_string(parameters->kind)));
+                                 excerpt(path), kGvhmrKey,
+                                 parameters == nullptr ? "none" : to_string(parameters->kind)));
   const auto table = [&](const std::string& key) {
     const PickleNode* node = pickle.find(*parameters, key);
-    if (node == nullptr) throw InputError(fmt::format("'{}': no '{}' in '{}'", shown(path), key, kGvhmrKey));
+    if (node == nullptr) throw InputError(fmt::format("'{}': no '{}' in '{}'", excerpt(path), key, kGvhmrKey));
     return table_of(file, *node, fmt::format("'{}' of '{}'", key, kGvhmrKey));
   };
   BodyMotion motion = body_motion(path, table("global_orient"), table("body_pose"), table("transl"));

@@ -42,7 +42,7 @@ std::string contents_of(const std::string& path) {
     if (array.ends_with(".npy")) array.erase(array.size() - 4);
   if (!arrays.empty()) return fmt::format("the file holds {}", fmt::join(arrays, ", "));
   const std::string head = leading_bytes(path, kShownFirstLine);
-  return fmt::format("the file begins with '{}'", shown(head.substr(0, head.find('\n')), kShownFirstLine));
+  return fmt::format("the file begins with '{}'", excerpt(head.substr(0, head.find('\n')), kShownFirstLine));
 }
 
 }  // namespace
@@ -84,7 +84,7 @@ const PeopleFormat& find_people_format(std::span<const std::string> paths, std::
   require(!paths.empty(), "expected the path of a motion of two people, found none");
   for (const std::string& path : paths)
     if (!std::filesystem::exists(path))
-      throw InputError(fmt::format("cannot read '{}': no such file or folder", shown(path)));
+      throw InputError(fmt::format("cannot read '{}': no such file or folder", excerpt(path)));
   for (const std::string& path : paths) require_data(path);
   for (const PeopleFormat& format : people_formats())
     if (name.empty() ? format.recognises(paths) : format.name == name) return format;
@@ -92,8 +92,8 @@ const PeopleFormat& find_people_format(std::span<const std::string> paths, std::
   throw InputError(
       fmt::format("'{}': no motion of two people that is known: {}; `duet list people-formats` says what is read, "
                   "`duet list robot-formats` the motions of one robot",
-                  shown(fmt::format("{}", fmt::join(paths.begin(), paths.end(), "', '")), kShownSentence / 4),
-                  shown(contents_of(paths.front()), kShownContents)));
+                  excerpt(fmt::format("{}", fmt::join(paths.begin(), paths.end(), "', '")), kShownSentence / 4),
+                  excerpt(contents_of(paths.front()), kShownContents)));
 }
 
 SourceClip read_source_clip(const PeopleFormat& format, const ClipPlace& place, const PeopleOptions& options) {

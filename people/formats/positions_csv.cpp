@@ -19,7 +19,7 @@ namespace {
 constexpr double kEvenTimes = 0.1;  // of a period
 
 [[noreturn]] void refuse_csv(const std::string& name, const std::string& fault) {
-  throw InputError(fmt::format("'{}': {}", shown(name, kShownSentence), fault));
+  throw InputError(fmt::format("'{}': {}", excerpt(name, kShownSentence), fault));
 }
 
 struct Column {
@@ -85,7 +85,7 @@ CsvHeader header_of(const CsvReader& row) {
   const auto has_axis = [](const Column& column) { return column.axis >= 0; };
   if (std::none_of(header.columns.begin(), header.columns.end(), has_axis))
     row.fail(fmt::format("expected names like 'left_wrist_x', found '{}'",
-                         shown(fmt::format("{}", fmt::join(row.fields(), ",")))));
+                         excerpt(fmt::format("{}", fmt::join(row.fields(), ",")))));
   header.two_people = std::all_of(header.columns.begin(), header.columns.end(), [&](const Column& column) {
     return !has_axis(column) || person_of(column.joint).has_value();
   });
@@ -123,16 +123,16 @@ class CsvPlaces {
   void add(const Column& column, int c) {
     if (column.axis < 0) return;
     const bool known = numbers_.contains(column.joint);
-    if (!known) refuse_csv(name_, fmt::format("joint '{}' stands there for person B only", shown(column.joint)));
+    if (!known) refuse_csv(name_, fmt::format("joint '{}' stands there for person B only", excerpt(column.joint)));
     if (!columns_.emplace(std::array{column.person, joint(column.joint), column.axis}, c).second)
-      refuse_csv(name_, fmt::format("column {}: joint '{}' has this axis twice", c + 1, shown(column.joint)));
+      refuse_csv(name_, fmt::format("column {}: joint '{}' has this axis twice", c + 1, excerpt(column.joint)));
   }
   void check(int people) const {
     for (int person = 0; person < people; ++person)
       for (std::size_t j = 0; j < joints_.size(); ++j)
         for (int axis = 0; axis < 3; ++axis)
           if (!columns_.contains({person, static_cast<int>(j), axis}))
-            refuse_csv(name_, fmt::format("joint '{}' of person {} has no column for {}", shown(joints_[j]),
+            refuse_csv(name_, fmt::format("joint '{}' of person {} has no column for {}", excerpt(joints_[j]),
                                           person == 0 ? "A" : "B", "xyz"[axis]));
   }
 
@@ -147,7 +147,7 @@ double number_of(const CsvReader& row, std::size_t column) {
   if (field.empty() || field == "nan" || field == "NaN" || field == "NAN")
     return std::numeric_limits<double>::quiet_NaN();
   const std::optional<double> value = row.number(field);
-  if (!value) row.fail(fmt::format("column {}: expected a number, found '{}'", column + 1, shown(field)));
+  if (!value) row.fail(fmt::format("column {}: expected a number, found '{}'", column + 1, excerpt(field)));
   return *value;
 }
 

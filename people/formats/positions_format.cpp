@@ -192,7 +192,7 @@ PointTracks one_person(NpyArray array, const std::string& what) {
 }
 
 std::string what_of(const std::string& file, const std::string& key) {
-  return fmt::format("'{}': array '{}'", shown(file, kShownSentence), key);
+  return fmt::format("'{}': array '{}'", excerpt(file, kShownSentence), key);
 }
 
 // The names of the columns where the file has them.
@@ -213,13 +213,13 @@ Keys take_npz(const std::string& path, RawPeople& people) {
       people.joints = {one_person(npz.array(a), what_of(path, a)), one_person(npz.array(b), what_of(path, b))};
   if (people.joints[0].empty())
     throw InputError(fmt::format("'{}': no positions with values in it; looked for arrays {}",
-                                 shown(path, kShownSentence), fmt::join(both_keys(), ", ")));
+                                 excerpt(path, kShownSentence), fmt::join(both_keys(), ", ")));
   for (const std::string& key : kRateKeys)
     if (npz.contains(key)) people.rate_hz = npz.number_or_text(key);
   for (const std::string& key : kLabelKeys)
     if (is_text(key)) people.source["label"] = npz.text(key);
   for (const std::string& key : kUpKeys)
-    if (is_text(key)) people.up = naming_file(path, [&] { return parse_axis(npz.text(key)); });
+    if (is_text(key)) people.up = with_file_context(path, [&] { return parse_axis(npz.text(key)); });
   for (const std::string& key : kNameKeys)
     if (is_text(key)) return npz.strings(key, {-1});
   return {};
@@ -231,27 +231,27 @@ Keys take_csv(const ClipPlace& place, RawPeople& people) {
   if (place.files.size() == 1) {
     if (!first.two_people)
       throw InputError(
-          fmt::format("'{}': expected two people (columns a_... and b_...), found one", shown(place.files[0])));
+          fmt::format("'{}': expected two people (columns a_... and b_...), found one", excerpt(place.files[0])));
     people.joints = std::move(first.tracks);
     return first.joints;
   }
   PositionsCsv second = parse_positions_csv(read_plain_text(place.files[1]), place.files[1]);
   if (second.joints != first.joints)
-    throw InputError(
-        fmt::format("'{}': expected the joints of '{}', found others", shown(place.files[1]), shown(place.files[0])));
+    throw InputError(fmt::format("'{}': expected the joints of '{}', found others", excerpt(place.files[1]),
+                                 excerpt(place.files[0])));
   if (second.rate_hz != first.rate_hz)
     throw InputError(fmt::format("'{}' is at {:g} Hz and '{}' at {:g} Hz: expected two people at the same rate",
-                                 shown(place.files[0]), first.rate_hz, shown(place.files[1]), second.rate_hz));
+                                 excerpt(place.files[0]), first.rate_hz, excerpt(place.files[1]), second.rate_hz));
   people.joints = {std::move(first.tracks[0]), std::move(second.tracks[0])};
   return first.joints;
 }
 
 void take_npy(const ClipPlace& place, RawPeople& people) {
   if (place.files.size() == 1)
-    return split_people(read_npy(place.files[0]), fmt::format("'{}'", shown(place.files[0], kShownSentence)), people);
+    return split_people(read_npy(place.files[0]), fmt::format("'{}'", excerpt(place.files[0], kShownSentence)), people);
   for (const std::size_t who : {0U, 1U})
     people.joints[who] =
-        one_person(read_npy(place.files[who]), fmt::format("'{}'", shown(place.files[who], kShownSentence)));
+        one_person(read_npy(place.files[who]), fmt::format("'{}'", excerpt(place.files[who], kShownSentence)));
 }
 
 // ---- whose joints
@@ -282,7 +282,7 @@ JointLayout layout_for(const Keys& names, int columns, const std::string& file, 
     sentence = fmt::format("skeleton: {} (the only one known of {} joints)", fitting[0], columns);
     return joint_layout(fitting[0]);
   }
-  throw InputError(fmt::format("'{}': nothing names its {} joints; state the skeleton{}", shown(file, kShownSentence),
+  throw InputError(fmt::format("'{}': nothing names its {} joints; state the skeleton{}", excerpt(file, kShownSentence),
                                columns,
                                fitting.empty() ? std::string(", or a file of names")
                                                : fmt::format(" ({}?), or a file of names", fmt::join(fitting, ", "))));

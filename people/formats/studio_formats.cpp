@@ -265,9 +265,9 @@ HarmonyFrame read_harmony_frame(const std::string& path) {
     const PickleNode& name = pickle[dict.items[2 * i]];
     const PickleNode& points = pickle[dict.items[2 * i + 1]];
     frame.who[i] = std::string(name.text);
-    frame.values[i] = array_values(pickle, points, fmt::format("person '{}'", shown(name.text)));
+    frame.values[i] = array_values(pickle, points, fmt::format("person '{}'", excerpt(name.text)));
     if (points.shape.size() != 2 || points.shape[0] != kHarmonyJoints || points.shape[1] < 3 || points.shape[1] > 4)
-      pickle.fail(points.offset, fmt::format("person '{}': expected shape (17, 4), found ({})", shown(name.text),
+      pickle.fail(points.offset, fmt::format("person '{}': expected shape (17, 4), found ({})", excerpt(name.text),
                                              fmt::join(points.shape, ", ")));
     frame.width[i] = points.shape[1];
   }
@@ -289,7 +289,8 @@ RawPeople read_harmony(const ClipPlace& place, const PeopleOptions& /*options*/)
     if (t == 0) who = frame.who;
     if (frame.who != who)
       throw InputError(fmt::format("'{}': expected people '{}' and '{}' as in the first frame, found '{}' and '{}'",
-                                   files[t], shown(who[0]), shown(who[1]), shown(frame.who[0]), shown(frame.who[1])));
+                                   files[t], excerpt(who[0]), excerpt(who[1]), excerpt(frame.who[0]),
+                                   excerpt(frame.who[1])));
     for (const std::size_t i : {0U, 1U})
       for (int k = 0; k < kHarmonyJoints; ++k)
         people.joints[i].at(static_cast<int>(t), k) =
@@ -298,7 +299,7 @@ RawPeople read_harmony(const ClipPlace& place, const PeopleOptions& /*options*/)
   people.rate_hz = kHarmonyRate;
   people.up = Axis::kPlusZ;
   people.metres_per_unit = 1.0;
-  people.evidence.push_back(fmt::format("people: A is '{}', B is '{}'", shown(who[0]), shown(who[1])));
+  people.evidence.push_back(fmt::format("people: A is '{}', B is '{}'", excerpt(who[0]), excerpt(who[1])));
   people.source = {{"format", "harmony4d"}, {"folder", folder}, {"label", file_name_of(sequence_of(folder))}};
   people.task = task_of_label(people.source["label"]);
   return people;

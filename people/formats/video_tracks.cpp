@@ -51,7 +51,7 @@ Stretch common_stretch(const Track& a, const Track& b) {
 
 Stretch longest_stretch(const std::string& name, const std::vector<Track>& tracks, std::vector<std::string>& evidence) {
   if (tracks.size() < 2)
-    throw InputError(fmt::format("'{}': expected two people, found {}", shown(name), tracks.size()));
+    throw InputError(fmt::format("'{}': expected two people, found {}", excerpt(name), tracks.size()));
   Stretch best;
   for (std::size_t a = 0; a < tracks.size(); ++a)
     for (std::size_t b = a + 1; b < tracks.size(); ++b) {
@@ -60,7 +60,7 @@ Stretch longest_stretch(const std::string& name, const std::vector<Track>& track
       if (stretch.frames > best.frames) best = stretch;
     }
   if (best.frames < 2)
-    throw InputError(fmt::format("'{}': no two of its {} people are in the picture at once for 2 frames", shown(name),
+    throw InputError(fmt::format("'{}': no two of its {} people are in the picture at once for 2 frames", excerpt(name),
                                  tracks.size()));
   evidence.push_back(
       fmt::format("people: tracks {} (A) and {} (B) of {}, frames {} to {} of the video, in which both are "

@@ -137,10 +137,10 @@ std::vector<NamedObject> objects_of(Hdf5Bytes& file, std::uint64_t group, const 
 Hdf5File::Hdf5File(const std::string& path) : file_(path) {
   constexpr std::uint64_t kSmallest = 48;  // of the newest superblock
   if (file_.size() < kSmallest)
-    throw InputError(fmt::format("'{}': expected an HDF5 file, found {} bytes", shown(path), file_.size()));
+    throw InputError(fmt::format("'{}': expected an HDF5 file, found {} bytes", excerpt(path), file_.size()));
   Hdf5Block block = file_.block(0, kSmallest);
   if (block.take(kHdf5Signature.size()) != kHdf5Signature)
-    throw InputError(fmt::format("'{}': byte 0: expected an HDF5 file, found other bytes", shown(path)));
+    throw InputError(fmt::format("'{}': byte 0: expected an HDF5 file, found other bytes", excerpt(path)));
   const std::uint64_t version = block.number(1);
   if (version > 3) block.fail(fmt::format("expected a superblock of version 0 to 3, found {}", version));
   if (version < 2) block.skip(4);
@@ -154,7 +154,7 @@ Hdf5File::Hdf5File(const std::string& path) : file_(path) {
   addresses.skip(8);
   const std::uint64_t end = addresses.number(8);
   if (end > file_.size())
-    throw InputError(fmt::format("'{}': truncated: expected {} bytes, found {}", shown(path), end, file_.size()));
+    throw InputError(fmt::format("'{}': truncated: expected {} bytes, found {}", excerpt(path), end, file_.size()));
   if (version < 2) addresses.skip(16);
   root_ = addresses.number(8);
 }
@@ -167,10 +167,10 @@ std::vector<std::string> Hdf5File::names() {
 
 std::uint64_t Hdf5File::address_of(const std::string& name) {
   const std::vector<NamedObject> found = objects_of(file_, root_, &name);
-  if (found.empty()) throw InputError(fmt::format("'{}': no array '{}'", shown(file_.path()), shown(name)));
+  if (found.empty()) throw InputError(fmt::format("'{}': no array '{}'", excerpt(file_.path()), excerpt(name)));
   if (found.front().header == kHdf5Nowhere)
-    throw InputError(
-        fmt::format("'{}': '{}' is a link to another place, which is not followed", shown(file_.path()), shown(name)));
+    throw InputError(fmt::format("'{}': '{}' is a link to another place, which is not followed", excerpt(file_.path()),
+                                 excerpt(name)));
   return found.front().header;
 }
 
@@ -240,7 +240,7 @@ std::vector<std::uint16_t> filters_of(const Hdf5Header& header) {
     block->skip(4 * values + (version == 1 && values % 2 != 0 ? 4 : 0));
     if (id < 1 || id > 3)
       block->fail(fmt::format("expected numbers as they are or through gzip and shuffle, found filter {} ({})", id,
-                              shown(name.c_str())));
+                              excerpt(name.c_str())));
     filters.push_back(static_cast<std::uint16_t>(id));
   }
   return filters;

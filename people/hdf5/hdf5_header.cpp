@@ -109,7 +109,7 @@ Hdf5Block::Hdf5Block(const std::string& file, std::uint64_t begin, std::string b
     : file_(file), begin_(begin), bytes_(std::move(bytes)) {}
 
 void Hdf5Block::fail(const std::string& fault) const {
-  throw InputError(fmt::format("'{}': byte {}: {}", shown(file_), position(), fault));
+  throw InputError(fmt::format("'{}': byte {}: {}", excerpt(file_), position(), fault));
 }
 
 std::string_view Hdf5Block::take(std::uint64_t size) {
@@ -136,23 +136,23 @@ void Hdf5Block::expect(std::string_view signature) {
 Hdf5Bytes::Hdf5Bytes(const std::string& path) : path_(path), file_(path, std::ios::binary) {
   std::error_code error;
   const bool plain = std::filesystem::is_regular_file(path, error);
-  if (!file_ || !plain) throw InputError(fmt::format("cannot read '{}': no such file", shown(path)));
+  if (!file_ || !plain) throw InputError(fmt::format("cannot read '{}': no such file", excerpt(path)));
   require_data(path);
   size_ = std::filesystem::file_size(path, error);
-  if (error) throw InputError(fmt::format("cannot read '{}': {}", shown(path), error.message()));
+  if (error) throw InputError(fmt::format("cannot read '{}': {}", excerpt(path), error.message()));
 }
 
 Hdf5Block Hdf5Bytes::block(std::uint64_t begin, std::uint64_t size) {
   if (begin > size_ || size > size_ - begin)
     throw InputError(
-        fmt::format("'{}': byte {}: expected {} bytes, the file ends at {}", shown(path_), begin, size, size_));
+        fmt::format("'{}': byte {}: expected {} bytes, the file ends at {}", excerpt(path_), begin, size, size_));
   std::string bytes(size, '\0');
   file_.clear();
   file_.seekg(static_cast<std::streamoff>(begin));
   file_.read(bytes.data(), static_cast<std::streamsize>(size));
   if (static_cast<std::uint64_t>(file_.gcount()) != size)
     throw InputError(
-        fmt::format("'{}': byte {}: expected {} bytes, read {}", shown(path_), begin, size, file_.gcount()));
+        fmt::format("'{}': byte {}: expected {} bytes, read {}", excerpt(path_), begin, size, file_.gcount()));
   return {path_, begin, std::move(bytes)};
 }
 

@@ -236,14 +236,14 @@ int parse_size(const OrderedJson& json, const Size& size, const std::string& fil
   const bool fits = value.is_number_integer() && value >= size.least && value <= size.most;
   if (!fits)
     refuse(file, fmt::format("'{}': expected a whole number from {} to {}, found {}", size.name, size.least, size.most,
-                             shown(dumped(value))));
+                             excerpt(dumped(value))));
   return value.get<int>();
 }
 
 bool parse_switch(const OrderedJson& json, const Switch& one, const std::string& file) {
   const OrderedJson& value = json_field(json, one.name, file);
   if (!value.is_boolean())
-    refuse(file, fmt::format("'{}': expected true or false, found {}", one.name, shown(dumped(value))));
+    refuse(file, fmt::format("'{}': expected true or false, found {}", one.name, excerpt(dumped(value))));
   return value.get<bool>();
 }
 

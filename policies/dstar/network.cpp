@@ -87,7 +87,7 @@ class Reader {
     return found->second;
   }
   void expect(const std::string& what, const std::string& expected, const std::string& found) const {
-    if (expected != found) refuse(fmt::format("{}: expected '{}', found '{}'", what, expected, shown(found)));
+    if (expected != found) refuse(fmt::format("{}: expected '{}', found '{}'", what, expected, excerpt(found)));
   }
   [[nodiscard]] std::vector<std::string> list(const std::string& key) const {
     const nlohmann::json json = parse_json(text(key), fmt::format("{}: '{}' in the header", file_, key));

@@ -36,7 +36,7 @@ constexpr const char* kMessage = "message of the policy";
 
 [[noreturn]] void refuse(const std::string& message) { throw InputError(fmt::format("{}: {}", kMessage, message)); }
 
-std::string excerpt(std::string_view text) { return shown(text, kExcerpt); }
+std::string clipped(std::string_view text) { return excerpt(text, kExcerpt); }
 
 Json parse_text(std::string_view text) {
   try {
@@ -57,13 +57,13 @@ const Json& member(const Json& json, const char* key) {
 int whole_number(const Json& json, const char* key) {
   const Json& value = member(json, key);
   if (!value.is_number_integer() || value < 0 || value > 1000000000)
-    refuse(fmt::format("'{}': expected a whole number, found {}", key, excerpt(dumped(value))));
+    refuse(fmt::format("'{}': expected a whole number, found {}", key, clipped(dumped(value))));
   return value.get<int>();
 }
 
 void refuse_other_keys(const Json& json, const std::vector<std::string>& known) {
   for (const auto& [key, value] : json.items())
-    if (std::ranges::find(known, key) == known.end()) refuse(unknown_name_message("key", excerpt(key), known));
+    if (std::ranges::find(known, key) == known.end()) refuse(unknown_name_message("key", clipped(key), known));
 }
 
 PolicyMessage parse_hello(const Json& json) {
@@ -134,7 +134,7 @@ PolicyMessage parse_policy_message(std::string_view text) {
   if (name == "hello") return parse_hello(json);
   if (name == "plan") return parse_plan(json);
   const std::vector<std::string> known = {"hello", "ready", "plan"};
-  if (name != "ready") refuse(unknown_name_message("type", excerpt(name), known));
+  if (name != "ready") refuse(unknown_name_message("type", clipped(name), known));
   refuse_other_keys(json, {"type"});
   return {};
 }

@@ -31,12 +31,12 @@ def _one_of(kind: str, one: str, several: Names) -> str:
 
 
 def _suite_of(suite: str, engine: str, controller: str, perturbation: str, settings: Optional[Mapping[str, Any]],
-              jobs: Optional[int]) -> "_duet.LedSuite":
+              jobs: Optional[int]) -> "_duet.EpisodeEnvironment":
     """"core/handshake": the suite's clips of one task; "core": all of them."""
     task = ""
     if not suite.endswith(".yaml") and suite.count("/") == 1:
         suite, task = suite.split("/")
-    return _duet.LedSuite(suite, overrides_of(settings), engine, controller, task, perturbation,
+    return _duet.EpisodeEnvironment(suite, overrides_of(settings), engine, controller, task, perturbation,
                           _duet.default_jobs() if jobs is None else whole_number("jobs", jobs))
 
 

@@ -8,8 +8,8 @@
 #include <tuple>
 
 #include "duet/report/page/html_page.h"
-#include "duet/report/ranking/board.h"
 #include "duet/report/ranking/leaderboard.h"
+#include "duet/report/ranking/ranking.h"
 #include "duet/report/tables/line_plot.h"
 #include "duet/report/tables/text_table.h"
 #include "duet/rows/groups/row_groups.h"
@@ -41,7 +41,7 @@ const Analysis* analysis_of(const ReportContent& content, std::string_view name)
 
 // The sentences of the board: the answer, before anything else.
 std::string verdict_html(const ReportContent& content) {
-  const Analysis* board = analysis_of(content, kBoardName);
+  const Analysis* board = analysis_of(content, kRankingName);
   if (board == nullptr || board->notes.empty()) return "";
   std::string html;
   for (const std::string& sentence : board->notes)
@@ -61,7 +61,7 @@ std::string header_html(const ReportContent& content) {
   html += verdict_html(content);
   if (!content.notes.empty()) {
     html += fmt::format(R"(<details class="notes"{}><summary>What the figures are: {} notes</summary><ul>)",
-                        analysis_of(content, kBoardName) == nullptr ? " open" : "", content.notes.size());
+                        analysis_of(content, kRankingName) == nullptr ? " open" : "", content.notes.size());
     for (const std::string& note : content.notes) html += fmt::format("<li>{}</li>", escape_html(note));
     html += "</ul></details>";
   }
@@ -206,12 +206,12 @@ std::vector<Section> sections_of(const ReportContent& content, nlohmann::json& d
   };
   const auto add_analyses = [&](bool opens) {
     for (const Analysis& analysis : content.analyses)
-      if (analysis.opens == opens && analysis.name != kLeaderboardName && analysis.name != kBoardName)
+      if (analysis.opens == opens && analysis.name != kLeaderboardName && analysis.name != kRankingName)
         add(analysis.name, analysis.title, analysis_html(analysis, drawn), opens);
   };
-  const Analysis* board = analysis_of(content, kBoardName);
+  const Analysis* board = analysis_of(content, kRankingName);
   if (board != nullptr && !board->tables.empty())
-    add(kBoardName, "Board", titled_table_html(board->tables.front()), true);
+    add(kRankingName, "Board", titled_table_html(board->tables.front()), true);
   add_analyses(true);
   add("replays", "Replays", replays_section(content.replays), true);
   add("episodes", "Episodes", episodes_section(content));
@@ -255,7 +255,7 @@ nlohmann::json drawn_figures(const Analysis& analysis) {
 std::string page_data(const ReportContent& content, nlohmann::json drawn) {
   nlohmann::json json = {{"schema", "duet.report/1"}, {"plots", std::move(drawn)}};
   std::set<std::pair<int, std::string>> tasks;
-  for (const std::string_view name : {std::string_view(kBoardName), std::string_view(kLeaderboardName)})
+  for (const std::string_view name : {std::string_view(kRankingName), std::string_view(kLeaderboardName)})
     if (const Analysis* analysis = analysis_of(content, name)) {
       json[std::string(name)] = drawn_figures(*analysis);
       for (const Estimate& figure : analysis->estimates) tasks.emplace(task_rank(figure.task), figure.task);

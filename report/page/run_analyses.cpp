@@ -49,7 +49,7 @@ struct ListedAnalysis {
 };
 
 constexpr ListedAnalysis kAnalyses[] = {
-    {kBoardName, [](const RunTables& run) { return board_analysis(run.board); }, Walking::kLeftOut, true},
+    {kRankingName, [](const RunTables& run) { return ranking_analysis(run.board); }, Walking::kLeftOut, true},
     {"leaderboard", [](const RunTables& run) { return leaderboard_analysis(run.leaderboard, run.metrics.all); },
      Walking::kWritten, true},
     {"interaction", [](const RunTables& run) { return interaction_analysis(run.rows); }, Walking::kLeftOut, true},
@@ -73,7 +73,7 @@ bool has_walking(const RunTables& tables) {
 }  // namespace
 
 RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate, RowFile file,
-                     const BoardSuite& suite) {
+                     const RankingSuite& suite) {
   RunTables tables{.rows = std::move(rows),
                    .file = std::move(file),
                    .metrics = std::move(metrics),
@@ -85,7 +85,7 @@ RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlo
   tables.leaderboard = leaderboard(tables.rows);
   tables.engines = cross_engine(tables.rows, tables.metrics.drifting, {.file = tables.file});
   tables.contacts = contact_analysis(tables.rows);
-  tables.board = board(tables.rows, tables.contacts.estimates, suite);
+  tables.board = rank_policies(tables.rows, tables.contacts.estimates, suite);
   return tables;
 }
 
@@ -123,7 +123,7 @@ std::string run_text(const std::vector<Analysis>& analyses) {
 
 std::string run_screen(const RunTables& tables, const std::vector<Analysis>& analyses,
                        const std::vector<std::string>& notes) {
-  if (!tables.rows.empty() && !has_walking(tables)) return board_screen(tables.board, notes);
+  if (!tables.rows.empty() && !has_walking(tables)) return ranking_screen(tables.board, notes);
   std::string text;
   for (const std::string& note : notes) text += "> " + note + "\n\n";
   return text + run_text(analyses);

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "duet/report/engines/cross_engine.h"
-#include "duet/report/ranking/board.h"
 #include "duet/report/ranking/contact_table.h"
 #include "duet/report/ranking/leaderboard.h"
+#include "duet/report/ranking/ranking.h"
 #include "duet/report/tables/analysis.h"
 
 namespace duet {
@@ -30,11 +30,11 @@ struct RunTables {
   std::vector<LeaderboardEntry> leaderboard;
   CrossEngine engines;
   Analysis contacts;
-  Board board;
+  Ranking board;
 };
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
 RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate,
-                     RowFile file = {}, const BoardSuite& suite = {});
+                     RowFile file = {}, const RankingSuite& suite = {});
 
 // The extent of the output: what ends a run, or all that `duet report` writes.
 enum class Extent { kRun, kReport };

@@ -32,7 +32,7 @@ std::vector<std::string> read_header(const CsvReader& row) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (columns[i].empty()) row.fail(fmt::format("column {} has no name", i + 1));
     if (std::count(columns.begin(), columns.end(), columns[i]) > 1)
-      row.fail(fmt::format("column '{}' is there twice", shown(columns[i])));
+      row.fail(fmt::format("column '{}' is there twice", excerpt(columns[i])));
   }
   return columns;
 }
@@ -44,7 +44,7 @@ double read_cell(const CsvReader& row, const std::string& cell, const std::strin
   char* end = nullptr;
   const double value = std::strtod(cell.c_str(), &end);
   if (*end != '\0' || std::isfinite(value))
-    row.fail(fmt::format("column '{}': expected a number, found '{}'", shown(column), shown(cell)));
+    row.fail(fmt::format("column '{}': expected a number, found '{}'", excerpt(column), excerpt(cell)));
   return value;
 }
 
@@ -66,7 +66,8 @@ TrainingCurves parse_curves(std::string_view csv, const std::string& name) {
       curves.values[i].push_back(read_cell(rows, rows.fields()[i], curves.columns[i]));
   }
   if (curves.values.empty() || curves.values.front().empty())
-    throw InputError(fmt::format("'{}': expected a line of column names and lines of values, found none", shown(name)));
+    throw InputError(
+        fmt::format("'{}': expected a line of column names and lines of values, found none", excerpt(name)));
   return curves;
 }
 

@@ -236,10 +236,10 @@ void add_comparison(const PairedRows& gathered, const IntervalOptions& options, 
   of.word("verdict", "");
 }
 
-PairVerdict verdict_of(double difference, const Interval& interval, double p_holm, double level, double margin) {
-  if (verdict_of(interval, margin) == PairVerdict::kSame) return PairVerdict::kSame;
-  if (std::isnan(p_holm) || p_holm > 1.0 - level) return PairVerdict::kUndecided;
-  return difference > 0.0 ? PairVerdict::kBetter : PairVerdict::kWorse;
+SequentialDecision verdict_of(double difference, const Interval& interval, double p_holm, double level, double margin) {
+  if (verdict_of(interval, margin) == SequentialDecision::kSame) return SequentialDecision::kSame;
+  if (std::isnan(p_holm) || p_holm > 1.0 - level) return SequentialDecision::kUndecided;
+  return difference > 0.0 ? SequentialDecision::kBetter : SequentialDecision::kWorse;
 }
 
 void judge_family(std::string_view difference, double level, double margin, Estimates& comparisons) {
@@ -257,7 +257,7 @@ void judge_family(std::string_view difference, double level, double margin, Esti
     if (estimate.name == "p_holm") estimate.value = p_holm = is_tested ? adjusted[next++] : std::nan("");
     if (estimate.name == "verdict")
       estimate.text = to_string(is_tested ? verdict_of(judged->value, judged->interval, p_holm, level, margin)
-                                          : PairVerdict::kUndecided);
+                                          : SequentialDecision::kUndecided);
   }
 }
 
@@ -292,7 +292,7 @@ std::vector<std::string> resolution_notes(const Estimates& comparisons, double l
   std::vector<std::string> notes;
   for (const PivotRow& row : rows_of(comparisons, comparison_pivot(group_title).rows)) {
     const Estimate& detectable = *row.find({.name = "minimum_detectable"});
-    const std::string_view undecided = to_string(PairVerdict::kUndecided);
+    const std::string_view undecided = to_string(SequentialDecision::kUndecided);
     if (detectable.value <= margin || row.find({.name = "verdict"})->text != undecided) continue;
     const double discordance =
         (row.value({.name = "only_a"}) + row.value({.name = "only_b"})) / static_cast<double>(*detectable.n);

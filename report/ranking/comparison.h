@@ -42,7 +42,7 @@ void add_comparison(const PairedRows& gathered, const IntervalOptions& options, 
 // interval of the estimate `difference` lies inside (-margin, margin); else better or worse where p_holm is at most 1 -
 // level; else, and without a p, undecided.
 void judge_family(std::string_view difference, double level, double margin, Estimates& comparisons);
-PairVerdict verdict_of(double difference, const Interval& interval, double p_holm, double level, double margin);
+SequentialDecision verdict_of(double difference, const Interval& interval, double p_holm, double level, double margin);
 // A line per comparison, called as `title` says.
 Pivot comparison_pivot(std::string (*title)(const Estimate& keys));
 

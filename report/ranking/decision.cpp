@@ -93,19 +93,19 @@ PairDecision decide_pair(PairDecision pair, const CellsOfClip& cells, const std:
     pair.e_value = test.e_value();
     pair.p = test.anytime_p();
     pair.verdict = verdict_of(pair.interval, options.min_effect);
-    if (pair.verdict != PairVerdict::kUndecided) break;
+    if (pair.verdict != SequentialDecision::kUndecided) break;
   }
   return pair;
 }
 
 std::string judgement(const PairDecision& pair) {
   switch (pair.verdict) {
-    case PairVerdict::kUndecided:
+    case SequentialDecision::kUndecided:
       break;
-    case PairVerdict::kBetter:
-    case PairVerdict::kWorse:
+    case SequentialDecision::kBetter:
+    case SequentialDecision::kWorse:
       return fmt::format("{} is {} than {}", pair.a, to_string(pair.verdict), pair.b);
-    case PairVerdict::kSame:
+    case SequentialDecision::kSame:
       return fmt::format("{} and {} are the {}", pair.a, pair.b, to_string(pair.verdict));
   }
   return fmt::format("{} against {} is undecided", pair.a, pair.b);
@@ -149,12 +149,13 @@ std::vector<std::vector<TaskClip>> decision_rounds(const std::vector<TaskClip>& 
 }
 
 bool Decision::is_decided() const {
-  return std::ranges::none_of(pairs, [](const PairDecision& pair) { return pair.verdict == PairVerdict::kUndecided; });
+  return std::ranges::none_of(pairs,
+                              [](const PairDecision& pair) { return pair.verdict == SequentialDecision::kUndecided; });
 }
 
 bool Decision::is_open(const std::string& policy) const {
   return std::ranges::any_of(pairs, [&](const PairDecision& pair) {
-    return pair.verdict == PairVerdict::kUndecided && (pair.a == policy || pair.b == policy);
+    return pair.verdict == SequentialDecision::kUndecided && (pair.a == policy || pair.b == policy);
   });
 }
 

@@ -35,7 +35,7 @@ std::vector<std::vector<TaskClip>> decision_rounds(const std::vector<TaskClip>& 
 
 struct PairDecision {
   std::string a, b;
-  PairVerdict verdict = PairVerdict::kUndecided;
+  SequentialDecision verdict = SequentialDecision::kUndecided;
   long rounds = 0, clips = 0;     // that it took, or that there were
   long better = 0, worse = 0;     // clips in which A succeeds more often, or B
   double difference = 0.0;        // A minus B, mean over clips; NaN without one

@@ -103,7 +103,7 @@ std::map<std::string, std::map<std::string, GoldenFigure>> read_baseline(const s
   const nlohmann::json json = parse_json(text, what);
   JsonFields fields(json, what);
   if (const std::string schema = fields.text("schema"); schema != kGoldenSchema) {
-    throw InputError(fmt::format("{}: expected schema {}, found {}", what, kGoldenSchema, shown(schema)));
+    throw InputError(fmt::format("{}: expected schema {}, found {}", what, kGoldenSchema, excerpt(schema)));
   }
   RunInfo blessed;
   blessed.suite = fields.text("suite");

@@ -198,8 +198,8 @@ std::vector<std::string> policy_fault_notes(const std::vector<LeaderboardEntry>&
   std::vector<std::string> notes;
   for (const auto& [name, sum] : policies) {
     const char* dead = sum.policy_dead > 0 ? ", which are errors and count as failures" : "";
-    notes.push_back(fmt::format("Policy '{}' lost plans (in {} episodes: {}{}). The first fault: {}", shown(name),
-                                sum.n, plans_lost(sum), dead, shown(sum.policy_fault, kLongestFault)));
+    notes.push_back(fmt::format("Policy '{}' lost plans (in {} episodes: {}{}). The first fault: {}", excerpt(name),
+                                sum.n, plans_lost(sum), dead, excerpt(sum.policy_fault, kLongestFault)));
   }
   return notes;
 }

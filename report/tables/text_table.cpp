@@ -28,7 +28,7 @@ std::string one_line(std::string_view text) {
   std::string line(text);
   std::replace_if(
       line.begin(), line.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
-  return shown(line, std::string::npos);
+  return excerpt(line, std::string::npos);
 }
 
 std::string escape_markdown_cell(std::string_view text) {

@@ -60,7 +60,7 @@ bool is_fresh(const std::string& folder) {
 void refuse_links(const std::string& folder) {
   for (const char* name :
        {"run.json", "env.json", "suite.yaml", "episodes.jsonl", "resumed.jsonl", "lock", "trajectories", "prepared"})
-    static_cast<void>(inside(folder, name));
+    static_cast<void>(join_without_links(folder, name));
   require_plain_files(folder);
 }
 
@@ -81,14 +81,14 @@ void require_same_suite(const std::string& folder, const RunInfo& found, const R
 
 // Also where a run was killed between the first file and these.
 void write_missing(const std::string& folder, const RunInfo& info) {
-  if (const std::string file = inside(folder, "env.json"); !std::filesystem::exists(file))
+  if (const std::string file = join_without_links(folder, "env.json"); !std::filesystem::exists(file))
     write_file(file, dumped(info.environment, 2) + "\n");
-  if (const std::string file = inside(folder, "suite.yaml"); !std::filesystem::exists(file))
+  if (const std::string file = join_without_links(folder, "suite.yaml"); !std::filesystem::exists(file))
     write_file(file, info.suite_yaml);
 }
 
 void require_same_actors(const std::string& folder, const RunInfo& found, const RunInfo& wanted) {
-  NameDigests digests;
+  IdentityCheck digests;
   digests.add(found, beside(folder, "run.json"));
   try {
     digests.add(wanted, "this machine");
@@ -101,7 +101,7 @@ void require_same_actors(const std::string& folder, const RunInfo& found, const 
 void record_resumption(const std::string& folder, const RunInfo& info) {
   nlohmann::json json = {{"at", info.created_at}, {"argv", info.argv}, {"environment", info.environment}};
   if (!info.certificate.is_null()) json["certificate"] = info.certificate;
-  LineAppender(inside(folder, "resumed.jsonl")).append(dumped(json));
+  LineAppender(join_without_links(folder, "resumed.jsonl")).append(dumped(json));
 }
 
 }  // namespace
@@ -118,10 +118,10 @@ RunDirectory RunDirectory::open(const std::string& path, const RunInfo& info, bo
   RunDirectory run;
   run.path_ = path;
   run.retry_errors_ = retry_errors;
-  run.lock_ = std::make_unique<FolderLock>(inside(path, "lock"));
+  run.lock_ = std::make_unique<FolderLock>(join_without_links(path, "lock"));
   const ScopedLock writing(*run.lock_, kWriting);
   const bool resumed = is_run(path);
-  if (!resumed) write_file(inside(path, "run.json"), run_json(info));
+  if (!resumed) write_file(join_without_links(path, "run.json"), run_json(info));
   RunInfo found = read_run_json(beside(path, "run.json"));
   require_same_suite(path, found, info);
   const bool alone = run.lock_->try_lock(kPresent);
@@ -150,7 +150,7 @@ void RunDirectory::replace(RunInfo& found, const RunInfo& wanted, const std::vec
   if (!alone)
     throw InputError(fmt::format("'{}': rows of {} cannot be replaced while another run works in the folder", path_,
                                  fmt::join(others, ", ")));
-  const std::string file = inside(path_, "episodes.jsonl");
+  const std::string file = join_without_links(path_, "episodes.jsonl");
   std::string kept;
   std::vector<std::string> keys;
   const std::string text = std::filesystem::exists(file) ? read_text(file) : "";
@@ -165,14 +165,14 @@ void RunDirectory::replace(RunInfo& found, const RunInfo& wanted, const std::vec
   for (const std::string& key : keys) {
     const std::string name = key.substr(0, 16);
     if (name.find_first_not_of("0123456789abcdef") == std::string::npos)
-      std::filesystem::remove(inside(path_, "trajectories") + "/" + name + ".npz");
+      std::filesystem::remove(join_without_links(path_, "trajectories") + "/" + name + ".npz");
   }
-  write_file(inside(path_, "run.json"), run_json(found));
+  write_file(join_without_links(path_, "run.json"), run_json(found));
 }
 
 // Under the lock: what others append later is read from here on.
 void RunDirectory::read_rows(const RunInfo& info) {
-  const std::string file = inside(path_, "episodes.jsonl");
+  const std::string file = join_without_links(path_, "episodes.jsonl");
   // Opening cuts an incomplete last line off, so that what is read after it is what the file holds.
   lines_ = std::make_unique<LineAppender>(file);
   suite_hash_ = info.suite_hash;
@@ -224,17 +224,17 @@ bool RunDirectory::append(const EpisodeRow& row) {
   return first;
 }
 
-void RunDirectory::ask_for(const RunPart& part, std::int64_t episodes,
-                           const std::function<std::int64_t(const std::vector<RunPart>&)>& count) {
+void RunDirectory::ask_for(const EpisodeFilter& part, std::int64_t episodes,
+                           const std::function<std::int64_t(const std::vector<EpisodeFilter>&)>& count) {
   const ScopedLock writing(*lock_, kWriting);
   RunInfo info = read_run_json(beside(path_, "run.json"));
   RunPlan plan;
-  plan.parts = with_part(info.plan ? info.plan->parts : std::vector<RunPart>(), part);
+  plan.parts = with_part(info.plan ? info.plan->parts : std::vector<EpisodeFilter>(), part);
   plan.episodes = episodes;
   plan.asked = count(plan.parts);
   if (info.plan == plan) return;
   info.plan = std::move(plan);
-  write_file(inside(path_, "run.json"), run_json(info));
+  write_file(join_without_links(path_, "run.json"), run_json(info));
 }
 
 bool RunDirectory::is_finished() {

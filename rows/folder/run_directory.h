@@ -53,8 +53,8 @@ class RunDirectory {
   bool append(const EpisodeRow& row);
 
   // Notes in run.json that this part of a suite of `episodes` is asked for; `count` counts what all parts have.
-  void ask_for(const RunPart& part, std::int64_t episodes,
-               const std::function<std::int64_t(const std::vector<RunPart>&)>& count);
+  void ask_for(const EpisodeFilter& part, std::int64_t episodes,
+               const std::function<std::int64_t(const std::vector<EpisodeFilter>&)>& count);
   // Whether every episode is here that was ever asked for.
   [[nodiscard]] bool is_finished();
 

@@ -35,7 +35,7 @@ void require_plain(const fs::path& path, const fs::file_status& status) {
   const Type type = status.type();
   if (type == Type::regular || type == Type::directory || type == Type::not_found || type == Type::none) return;
   throw InputError(fmt::format(
-      "'{}' is {}: expected a file or a folder of the run's own", shown(path.string(), 400),
+      "'{}' is {}: expected a file or a folder of the run's own", excerpt(path.string(), 400),
       type == Type::symlink ? "a symbolic link, which may lead out of the folder" : "a device, a pipe or a socket"));
 }
 
@@ -132,19 +132,19 @@ void check_published(const std::string& folder) {
   const nlohmann::json json = parse_json(read_text(path), path);
   JsonFields fields(json, path);
   if (const std::string schema = fields.text("schema"); schema != kPublishedSchema)
-    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kPublishedSchema, shown(schema)));
+    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kPublishedSchema, excerpt(schema)));
   const nlohmann::json& files = fields.at("files");
   if (!files.is_object() || !files.contains(kPublishedRows))
     throw InputError(fmt::format("{}: key 'files': expected the SHA-256 of {} and others", path, kPublishedRows));
   for (const auto& [name, digest] : files.items()) {
     if (!stays_below(name))
       throw InputError(
-          fmt::format("{}: key 'files': expected names of files in the folder, found '{}'", path, shown(name)));
+          fmt::format("{}: key 'files': expected names of files in the folder, found '{}'", path, excerpt(name)));
     require_plain_file(folder, name);
     const std::string found = sha256_file(file_of(folder, name));
     if (digest != found)
       throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: not what was published", file_of(folder, name),
-                                   shown(dumped(digest)), found));
+                                   excerpt(dumped(digest)), found));
   }
 }
 

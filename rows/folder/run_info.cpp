@@ -19,14 +19,14 @@ using nlohmann::json;
 constexpr std::string_view kRunSchema = "duet.run/1";
 
 using Names = std::vector<std::string>;
-constexpr std::array<std::pair<const char*, Names RunPart::*>, 5> kPartKeys = {
-    {{"engines", &RunPart::engines},
-     {"controllers", &RunPart::controllers},
-     {"policies", &RunPart::policies},
-     {"tasks", &RunPart::tasks},
-     {"perturbations", &RunPart::perturbations}}};
+constexpr std::array<std::pair<const char*, Names EpisodeFilter::*>, 5> kPartKeys = {
+    {{"engines", &EpisodeFilter::engines},
+     {"controllers", &EpisodeFilter::controllers},
+     {"policies", &EpisodeFilter::policies},
+     {"tasks", &EpisodeFilter::tasks},
+     {"perturbations", &EpisodeFilter::perturbations}}};
 
-json to_json(const RunPart& part) {
+json to_json(const EpisodeFilter& part) {
   json object = json::object();
   for (const auto& [key, names] : kPartKeys)
     if (!(part.*names).empty()) object[key] = part.*names;
@@ -35,7 +35,7 @@ json to_json(const RunPart& part) {
 
 json to_json(const RunPlan& plan) {
   json parts = json::array();
-  for (const RunPart& part : plan.parts) parts.push_back(to_json(part));
+  for (const EpisodeFilter& part : plan.parts) parts.push_back(to_json(part));
   return {{"episodes", plan.episodes}, {"asked", plan.asked}, {"parts", std::move(parts)}};
 }
 
@@ -50,9 +50,9 @@ Names read_names(JsonFields& fields, const std::string& key, const std::string& 
   return names;
 }
 
-RunPart read_part(const json& object, const std::string& what) {
+EpisodeFilter read_part(const json& object, const std::string& what) {
   JsonFields fields(object, what);
-  RunPart part;
+  EpisodeFilter part;
   for (const auto& [key, names] : kPartKeys)
     if (fields.has(key)) part.*names = read_names(fields, key, what);
   fields.refuse_unknown();
@@ -89,14 +89,15 @@ json read_certificate(JsonFields& fields, const std::string& path) {
 
 }  // namespace
 
-std::vector<RunPart> with_part(std::vector<RunPart> parts, RunPart part) {
+std::vector<EpisodeFilter> with_part(std::vector<EpisodeFilter> parts, EpisodeFilter part) {
   for (const auto& [key, member] : kPartKeys) {
     Names& names = part.*member;
     std::sort(names.begin(), names.end());
     names.erase(std::unique(names.begin(), names.end()), names.end());
   }
   parts.push_back(std::move(part));
-  if (std::any_of(parts.begin(), parts.end(), [](const RunPart& p) { return p.is_whole(); })) return {RunPart()};
+  if (std::any_of(parts.begin(), parts.end(), [](const EpisodeFilter& p) { return p.is_whole(); }))
+    return {EpisodeFilter()};
   if (std::find(parts.begin(), parts.end() - 1, parts.back()) != parts.end() - 1) parts.pop_back();
   return parts;
 }
@@ -120,7 +121,7 @@ RunInfo read_run_json(const std::string& path) {
   const json object = parse_json(read_text(path), path);
   JsonFields fields(object, path);
   if (const std::string schema = fields.text("schema"); schema != kRunSchema)
-    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kRunSchema, shown(schema)));
+    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kRunSchema, excerpt(schema)));
   RunInfo info;
   info.suite = fields.text("suite");
   info.suite_version = fields.text("suite_version");
@@ -143,8 +144,8 @@ std::string suite_label(const RunInfo& info) { return suite_label(info.suite, in
 
 std::string short_digest(const std::string& digest) { return digest.empty() ? "absent" : digest.substr(0, 12); }
 
-void NameDigests::add(const std::string& kind, const std::string& name, const std::string& digest,
-                      const std::string& where) {
+void IdentityCheck::add(const std::string& kind, const std::string& name, const std::string& digest,
+                        const std::string& where) {
   const auto [found, is_new] = places_.try_emplace({kind, name}, Place{digest, where});
   const Place& first = found->second;
   if (is_new || first.digest == digest) return;
@@ -152,14 +153,14 @@ void NameDigests::add(const std::string& kind, const std::string& name, const st
                                short_digest(first.digest), first.where, short_digest(digest), where, kind));
 }
 
-void NameDigests::add(const EpisodeRow& row, const std::string& where) {
+void IdentityCheck::add(const EpisodeRow& row, const std::string& where) {
   add("policy", row.policy, row.policy_digest, where);
   add("controller", row.controller, row.controller_digest, where);
   const bool ran = row.outcome != Outcome::kUnsupported && !row.profile_digest.empty();
   if (ran) add("profile of engine", row.engine, row.profile_digest, where);
 }
 
-void NameDigests::add(const RunInfo& info, const std::string& where) {
+void IdentityCheck::add(const RunInfo& info, const std::string& where) {
   for (const auto& [name, digest] : info.policies)
     if (!digest.empty()) add("policy", name, digest, where);
   for (const auto& [name, digest] : info.controllers)

@@ -14,17 +14,17 @@
 namespace duet {
 
 // A part of a suite that somebody asked for: names; an empty list stands for all. The null arm belongs to each.
-struct RunPart {
+struct EpisodeFilter {
   std::vector<std::string> engines, controllers, policies, tasks, perturbations;
 
-  bool operator==(const RunPart&) const = default;
-  [[nodiscard]] bool is_whole() const { return *this == RunPart(); }
+  bool operator==(const EpisodeFilter&) const = default;
+  [[nodiscard]] bool is_whole() const { return *this == EpisodeFilter(); }
 };
 
 // How many episodes a run is to have: the whole suite, and all parts together that were asked for so far.
 struct RunPlan {
   std::int64_t episodes = 0, asked = 0;
-  std::vector<RunPart> parts;  // one that is whole stands alone
+  std::vector<EpisodeFilter> parts;  // one that is whole stands alone
 
   bool operator==(const RunPlan&) const = default;
 };
@@ -42,7 +42,7 @@ struct RunInfo {
 };
 
 // `parts` with one more, in a form that tells equal ones: names sorted, each part once, one that is whole alone.
-std::vector<RunPart> with_part(std::vector<RunPart> parts, RunPart part);
+std::vector<EpisodeFilter> with_part(std::vector<EpisodeFilter> parts, EpisodeFilter part);
 
 // The text of run.json; environment and suite_yaml have files of their own.
 std::string run_json(const RunInfo& info);
@@ -56,7 +56,7 @@ std::string suite_label(const RunInfo& info);
 // Which digest a name in rows stands for. Rows that say "dstar" and were made by two networks are of two policies: they
 // are never in one table, one run or one merge.
 
-class NameDigests {
+class IdentityCheck {
  public:
   // `kind`: "policy"; `where`: for messages. Throws InputError where the name stands for another digest already: both,
   // and where each was found. An empty digest is one too: of a policy whose files are not there.

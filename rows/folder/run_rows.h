@@ -46,7 +46,7 @@ class RunRows {
   RowExtent extent_;
   bool needs_whole_rows_ = false;
   NamePool pool_;
-  NameDigests digests_;
+  IdentityCheck digests_;
   int line_ = 0, equal_ = 0, superseded_ = 0;
   std::vector<EpisodeRow> rows_;                                    // in file order
   std::vector<int> lines_;                                          // of each, from 1

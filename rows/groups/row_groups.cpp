@@ -99,7 +99,7 @@ void require_one_suite(const std::vector<EpisodeRow>& rows) {
       throw InputError(fmt::format("rows judged by detectors {} and {}: results are comparable only within one version",
                                    first.detectors, row.detectors));
   }
-  NameDigests digests;
+  IdentityCheck digests;
   for (const EpisodeRow& row : rows)
     digests.add(row, fmt::format("the row of {} {} {}", row.task, row.clip, row.episode));
 }

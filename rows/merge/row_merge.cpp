@@ -139,7 +139,7 @@ class MergeIndexer {
 
 // Throws InputError where a name stands for two digests. In the order of the sources, whatever thread read them.
 void check_digests(const std::vector<MergeIndexer>& indexers, const std::vector<RowSource>& sources) {
-  NameDigests digests;
+  IdentityCheck digests;
   for (std::uint32_t source = 0; source < sources.size(); ++source)
     for (const MergeIndexer& indexer : indexers)
       if (const auto found = indexer.naming().find(source); found != indexer.naming().end())

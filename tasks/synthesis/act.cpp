@@ -17,7 +17,7 @@ double reach_ahead(const Body& body, int side, double z, double share, const Lea
 }
 
 // From `from`, straight and with the hips turned as the manner has it: the hand gets to the point on the way, too.
-Lean lean_to_meet(const Cast& cast, int person, const Layout& layout, const Lean& from, double share) {
+Lean lean_to_meet(const Participants& cast, int person, const Layout& layout, const Lean& from, double share) {
   Lean lean = from;
   for (const double hips : {0.0, -side_sign(cast.side) * cast.manner.turn[person]}) {
     lean.hips = hips;
@@ -27,7 +27,7 @@ Lean lean_to_meet(const Cast& cast, int person, const Layout& layout, const Lean
 }
 
 // On the line between the roots, which are then where the manner has them.
-void meet_between(const Cast& cast, double share_of_a, Layout& layout) {
+void meet_between(const Participants& cast, double share_of_a, Layout& layout) {
   stand_at_bearings(cast, layout);
   layout.meet.head<2>() = share_of_a * Eigen::Vector2d(layout.distance, layout.lateral);
 }
@@ -45,7 +45,7 @@ Eigen::Vector3d seen_by(int person, const Layout& layout, const Eigen::Vector3d&
   return layout.turn == 0.0 ? ahead : Eigen::Vector3d(rot_z(-layout.turn) * ahead);
 }
 
-void stand_at_bearings(const Cast& cast, Layout& layout) {
+void stand_at_bearings(const Participants& cast, Layout& layout) {
   const auto& [a, b] = cast.manner.bearing;
   if (a == 0.0 && b == 0.0) return;
   const double to_hand = side_sign(cast.side), roots = std::hypot(layout.distance, layout.lateral);
@@ -55,7 +55,8 @@ void stand_at_bearings(const Cast& cast, Layout& layout) {
   layout.turn = to_hand * (a - b);
 }
 
-Layout meeting_layout(const Cast& cast, double z, double share, double nearest, double farthest, const Lean& lean) {
+Layout meeting_layout(const Participants& cast, double z, double share, double nearest, double farthest,
+                      const Lean& lean) {
   std::array<double, 2> ahead;
   for (const int k : {0, 1})
     ahead[k] = std::clamp(reach_ahead(cast.body[k], cast.side, z, share, lean), nearest, farthest);
@@ -67,7 +68,7 @@ Layout meeting_layout(const Cast& cast, double z, double share, double nearest, 
   return layout;
 }
 
-Layout meeting_at_distance(const Cast& cast, double z, double distance, const Lean& lean) {
+Layout meeting_at_distance(const Participants& cast, double z, double distance, const Lean& lean) {
   const double arms = cast.body[0].arm() + cast.body[1].arm();
   Layout layout;
   layout.distance = distance;

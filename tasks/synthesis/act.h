@@ -52,7 +52,7 @@ class Draws {
 };
 
 // How people go about an act. `rehearsed`: the way of the first generator, to the bit.
-struct Manner {
+struct MotionStyle {
   bool rehearsed = true;
   double tempo = 1.0;                   // how many times as fast the scene is played as it is planned
   std::optional<double> distance = {};  // of the roots in the act [m]; else the layout's own
@@ -81,13 +81,13 @@ struct RecordedManner {
 };
 
 // The two people who take part, before anybody is placed.
-struct Cast {
+struct Participants {
   std::array<Body, 2> body;  // A, B
   int side = 1;              // of the acting hand: 0 left, 1 right
   double style = 0.5;
   std::optional<double> target_height;  // above the ground [m]
   double farthest = 2.0;                // largest root distance that leaves both a way to walk [m]
-  Manner manner = {};
+  MotionStyle manner = {};
 };
 
 // How they stand to each other: A at the origin facing +x, B at (distance, lateral) facing -x turned by `turn`. [m]
@@ -106,7 +106,7 @@ struct Touch {
 };
 
 struct Scene {
-  Cast cast;
+  Participants cast;
   Layout layout;
   std::array<Performer, 2> people;
   double act_begin = 0.0;  // both stand [s]
@@ -122,7 +122,7 @@ struct Act {
   double lowest, highest;    // target heights that may be asked for; equal where the task has none [m]
   double touch_distance;     // joints of a contact window are at most this far apart [m]; 0: no contact
   bool close;                // they stand so close that they must step back before they may turn
-  Layout (*layout)(const Cast&, Draws&);
+  Layout (*layout)(const Participants&, Draws&);
   void (*perform)(Scene&, Draws&);
   RecordedManner recorded = {};
 };
@@ -133,12 +133,13 @@ Eigen::Vector3d in_world(const Placement& placement, const Eigen::Vector3d& poin
 Eigen::Vector3d seen_by(int person, const Layout& layout, const Eigen::Vector3d& point_of_a);
 
 // The same two, each having the other where the cast's manner says; the roots keep their distance.
-void stand_at_bearings(const Cast& cast, Layout& layout);
+void stand_at_bearings(const Participants& cast, Layout& layout);
 
 // Distance and leans where the distance is given and the hands meet at height `z` between them.
-Layout meeting_at_distance(const Cast& cast, double z, double distance, const Lean& lean);
+Layout meeting_at_distance(const Participants& cast, double z, double distance, const Lean& lean);
 // Distance and leans for hands that meet at height `z`: each reaches with `share` of the arm, but neither less than
 // `nearest` nor more than `farthest` in front of the own root.
-Layout meeting_layout(const Cast& cast, double z, double share, double nearest, double farthest, const Lean& lean);
+Layout meeting_layout(const Participants& cast, double z, double share, double nearest, double farthest,
+                      const Lean& lean);
 
 }  // namespace duet::synthesis

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "duet/tasks/synthesis/figure.h"
+#include "duet/tasks/synthesis/posed_body.h"
 
 namespace duet::synthesis {
 

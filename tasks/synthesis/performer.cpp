@@ -40,7 +40,7 @@ TorsoPose standing_torso(const Body& body, const Placement& root, const Lean& le
 }
 
 Eigen::Vector3d shoulder_at(const Body& body, int side, const Lean& lean) {
-  Figure figure;
+  PosedBody figure;
   pose_torso(body, standing_torso(body, {}, lean, body.stand_height), figure);
   return figure.p.col(sided(kLeftShoulder, side));
 }

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "duet/tasks/synthesis/curves.h"
-#include "duet/tasks/synthesis/figure.h"
 #include "duet/tasks/synthesis/gait.h"
+#include "duet/tasks/synthesis/posed_body.h"
 
 namespace duet::synthesis {
 
@@ -19,8 +19,8 @@ struct Moment {
   double t = 0.0;
   int side = 0;  // of the arm
   const Body& body;
-  const Figure& own;
-  const Figure& partner;
+  const PosedBody& own;
+  const PosedBody& partner;
   double swing = 0.0;    // forward swing of the hanging arm in walking [rad]
   Eigen::Vector3d sway;  // slow unsteadiness of a free hand, in [-1, 1]
 };

@@ -16,7 +16,7 @@ namespace {
 
 DemonstrationOptions small_options() {
   DemonstrationOptions options;
-  options.clips = {{Likeness::kRehearsed, 3}};
+  options.clips = {{Likeness::kScripted, 3}};
   options.pair_mode = "paper";
   options.starts = 2;
   options.followed = 1;
@@ -120,7 +120,7 @@ TEST(MakeDemonstrations, BothKindsOfClipsAreInOneSet) {
   DemonstrationOptions options = small_options();
   options.engine = "";
   options.starts = 1;
-  options.clips = {{Likeness::kRehearsed, 1}, {Likeness::kPeople, 2}};
+  options.clips = {{Likeness::kScripted, 1}, {Likeness::kPeople, 2}};
   EXPECT_THAT(made(options).list, ::testing::SizeIs(18));
 }
 

@@ -174,7 +174,7 @@ TEST(ReplayChoice, NamesWhatItDoesNotKnow) {
               HasSubstr("no episode of the run is what"));
 }
 
-Suite kept_suite(const std::string& record) {
+Suite archive_inputs(const std::string& record) {
   return parse_suite(
       "schema: duet.suite/1\nname: seen\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [hug]\n"
       "engines: [playback]\ncontrollers: [pd]\npolicies: [replay]\nstart: clip\n"
@@ -188,7 +188,7 @@ using DuetRun = Run;  // testing::Test has one of its own
 class Replay : public testing::Test {
  protected:
   DuetRun run(const std::string& record) {
-    test::make_run(kept_suite(record), folder_ / record);
+    test::make_run(archive_inputs(record), folder_ / record);
     return load_run(folder_ / record);
   }
   ReplayContent content(const DuetRun& run, const ReplayChoice& choice = {}) {
@@ -508,7 +508,7 @@ TEST_F(ReplayOfMotions, TheCommandTakesFilesAndFolders) {
 
 TEST_F(Replay, TheFolderOfARunIsNamed) {
   std::filesystem::create_directory(folder_ / "demo");
-  test::make_run(kept_suite("all"), folder_ / "demo/run");
+  test::make_run(archive_inputs("all"), folder_ / "demo/run");
   const test::Answer answer = test::duet_program("replay " + (folder_ / "demo") + " -f mcap");
   EXPECT_EQ(answer.code, 2);
   EXPECT_THAT(answer.err, HasSubstr("is not a run directory (no run.json); '" + (folder_ / "demo/run") + "' is one"));

@@ -298,24 +298,24 @@ TEST_F(RunFolder, ADamagedOrForeignPreparedClipIsMadeAnew) {
 TEST_F(RunFolder, PreparationThatIsStoppedThrowsStopped) {
   write_suite();
   Progress quiet(Progress::Style::kQuiet);
-  const StopSign stop(1e-9);
+  const StopToken stop(1e-9);
   EXPECT_THROW(prepare_clips(load_suite(folder_ / "suite.yaml"), *test::g1(), 1, quiet, {.stop = &stop}), Stopped);
 }
 
 TEST_F(RunFolder, WorkThatDoesNotHearTheSignIsEndedAfterItsGrace) {
   std::atomic<int> calls{0};
-  const StopSign stop(1e-9);
+  const StopToken stop(1e-9);
   {
-    const StopWatch watch(stop, 0.01, [&](RunEnd end) { calls += end == RunEnd::kTimeLimit ? 1 : 100; });
+    const Watchdog watch(stop, 0.01, [&](RunEnd end) { calls += end == RunEnd::kTimeLimit ? 1 : 100; });
     while (calls == 0) std::this_thread::yield();
   }
   EXPECT_EQ(calls, 1);
   {
-    const StopWatch watch(stop, 1e6, [&](RunEnd) { ++calls; });
+    const Watchdog watch(stop, 1e6, [&](RunEnd) { ++calls; });
   }
-  const StopSign never;
+  const StopToken never;
   {
-    const StopWatch watch(never, 0.0, [&](RunEnd) { ++calls; });
+    const Watchdog watch(never, 0.0, [&](RunEnd) { ++calls; });
   }
   EXPECT_EQ(calls, 1);
 }
@@ -389,7 +389,7 @@ TEST_F(RunFolder, NumbersOfTheCommandLineHaveBounds) {
 TEST(EpisodePlan, ArmsOfAClipFollowOneAnotherAndEachEpisodeIsMadeWhenItIsAskedFor) {
   Suite suite = test::playback_suite();
   suite.episodes_per_clip = 2;
-  Bodies bodies(suite);
+  Embodiments bodies(suite);
   Progress quiet(Progress::Style::kQuiet);
   bodies.take_clips(prepare_clips(suite, *bodies.nominal(), 1, quiet));
   const EpisodePlan plan(suite, bodies);
@@ -408,19 +408,19 @@ TEST(EpisodePlan, ArmsOfAClipFollowOneAnotherAndEachEpisodeIsMadeWhenItIsAskedFo
 // Its specs point into the experiment: it stays where it is.
 TEST(Experiment, AndItsPlanCannotBeMovedOrCopied) {
   EXPECT_FALSE(std::is_move_constructible_v<Experiment> || std::is_move_assignable_v<Experiment>);
-  EXPECT_FALSE(std::is_move_constructible_v<Bodies> || std::is_move_assignable_v<Bodies>);
+  EXPECT_FALSE(std::is_move_constructible_v<Embodiments> || std::is_move_assignable_v<Embodiments>);
   EXPECT_FALSE(std::is_move_constructible_v<EpisodePlan> || std::is_move_assignable_v<EpisodePlan>);
-  EXPECT_FALSE((std::is_constructible_v<EpisodePlan, Suite, const Bodies&>)) << "of a suite that is gone";
+  EXPECT_FALSE((std::is_constructible_v<EpisodePlan, Suite, const Embodiments&>)) << "of a suite that is gone";
 }
 
 TEST(EpisodePlan, CountsWhatPartsHave) {
   Suite suite = test::playback_suite();
   const std::vector<Task> clips = {Task::kWave, Task::kHandshake, Task::kHandshake};
-  RunPart wave, playback, nobody;
+  EpisodeFilter wave, playback, nobody;
   wave.tasks = {"wave"};
   playback.engines = {"playback"};
   nobody.policies = {"dstar"};
-  EXPECT_EQ(count_episodes(suite, clips, {RunPart()}), 6);
+  EXPECT_EQ(count_episodes(suite, clips, {EpisodeFilter()}), 6);
   EXPECT_EQ(count_episodes(suite, clips, {wave}), 2);
   EXPECT_EQ(count_episodes(suite, clips, {wave, playback}), 6);
   EXPECT_EQ(count_episodes(suite, clips, {nobody}), 3);  // the null arm

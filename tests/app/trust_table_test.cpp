@@ -20,8 +20,8 @@
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
 #include "duet/core/share.h"
+#include "duet/execution/report_content.h"
 #include "duet/execution/run_inputs.h"
-#include "duet/execution/story.h"
 #include "duet/execution/verification.h"
 #include "duet/rows/folder/run_directory.h"
 #include "duet/rows/json_fields.h"
@@ -112,7 +112,7 @@ class TrustTable : public testing::Test {
     const std::string suite = *world_ / "here/suite.yaml", run = *world_ / "run", planned = *world_ / "planned",
                       trainings = *world_ / "trainings";
     // In this process, which has another digest than the program.
-    StopSign stop;
+    StopToken stop;
     Progress quiet(Progress::Style::kQuiet);
     PlanOptions options;
     options.costs = {{"playback/pd", 0.01}};
@@ -206,7 +206,8 @@ class TrustTable : public testing::Test {
       const duet::Run run = load_run(folder);
       const RunTables tables = tables_of(run.rows, run);
       const std::vector<Analysis> analyses = run_analyses(tables);
-      for (const auto& [name, text] : analysis_files(analyses, "md")) write_file(inside(folder, name), text);
+      for (const auto& [name, text] : analysis_files(analyses, "md"))
+        write_file(join_without_links(folder, name), text);
       for (const auto& [name, text] : analysis_files(analyses, "csv")) write_file(out + "/" + name, text);
       write_file(out + "/report.html",
                  html_report(report_content(run, tables, analyses, {}, episodes, {}, 1, quiet_), {}));
@@ -230,7 +231,7 @@ class TrustTable : public testing::Test {
   static test::ScratchFolder* world_;
   test::ScratchFolder scratch_, outside_;
   std::string script_;  // that was run last
-  StopSign stop_;
+  StopToken stop_;
   Progress quiet_{Progress::Style::kQuiet};
 };
 test::ScratchFolder* TrustTable::world_ = nullptr;
@@ -246,7 +247,7 @@ TEST_F(TrustTable, HasARowForEveryFileThatDuetWrites) {
 TEST_F(TrustTable, EveryFileThatARunKeepsHasARow) {
   const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/policies/";
   const Suite suite = load_suite(*world_ / "here/suite.yaml", {{"policies", "['" + examples + "wave_policy.yaml']"}});
-  keep_inputs(kept_suite(suite, scratch_ / "kept"), scratch_ / "kept");
+  keep_inputs(archive_inputs(suite, scratch_ / "kept"), scratch_ / "kept");
   const std::vector<TableRow> table = trust_table();
   for (const std::string& name : files_below(scratch_ / "kept")) EXPECT_NE(row_of(table, name), nullptr) << name;
 }

@@ -61,7 +61,7 @@ TEST_P(Conformance, Holds) {
   if (const std::string reason = absence(engine); !reason.empty()) GTEST_SKIP() << "not run: " << reason;
   const EngineReport report = run_suite(engine, {}, std::vector{scene});
   for (const Measurement& found : report.scenes[0].run.measurements)
-    if (verdict_on(engine, found) == Verdict::kFail) ADD_FAILURE() << sentence(engine, found);
+    if (status_of(engine, found) == CheckStatus::kFail) ADD_FAILURE() << sentence(engine, found);
   EXPECT_FALSE(report.scenes[0].run.measurements.empty());
   for (const std::string& stale : stale_deviations(report)) ADD_FAILURE() << stale;
 }
@@ -101,16 +101,16 @@ EngineReport report_of(const std::string& engine, std::vector<Measurement> measu
 
 TEST(ConformanceVerdict, IsByAbsoluteOrRelativeErrorAndFailsForNaN) {
   Measurement found = measured(101.0, 100.0, 1.0);
-  EXPECT_EQ(verdict_on("ode", found), Verdict::kPass);
+  EXPECT_EQ(status_of("ode", found), CheckStatus::kPass);
   found.value = 101.1;
-  EXPECT_EQ(verdict_on("ode", found), Verdict::kFail);
+  EXPECT_EQ(status_of("ode", found), CheckStatus::kFail);
   found.relative = true;
   found.tolerance = 0.02;
-  EXPECT_EQ(verdict_on("ode", found), Verdict::kPass);
+  EXPECT_EQ(status_of("ode", found), CheckStatus::kPass);
   found.expected = -100.0;
-  EXPECT_EQ(verdict_on("ode", found), Verdict::kFail);
+  EXPECT_EQ(status_of("ode", found), CheckStatus::kFail);
   found.value = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(verdict_on("ode", found), Verdict::kFail);
+  EXPECT_EQ(status_of("ode", found), CheckStatus::kFail);
 }
 
 TEST(ConformanceVerdict, KnownDeviationHoldsUpToItsBoundForItsEngineOnly) {
@@ -120,10 +120,10 @@ TEST(ConformanceVerdict, KnownDeviationHoldsUpToItsBoundForItsEngineOnly) {
   Measurement found = measured(0.99 * known.bound, 0.0, 0.0);
   found.scene = known.scene;
   found.quantity = known.quantity;
-  EXPECT_EQ(verdict_on(here->engine, found), Verdict::kDeviation);
-  EXPECT_EQ(verdict_on("another", found), Verdict::kFail);
+  EXPECT_EQ(status_of(here->engine, found), CheckStatus::kDeviation);
+  EXPECT_EQ(status_of("another", found), CheckStatus::kFail);
   found.value = 1.01 * known.bound;
-  EXPECT_EQ(verdict_on(here->engine, found), Verdict::kFail);
+  EXPECT_EQ(status_of(here->engine, found), CheckStatus::kFail);
 }
 
 TEST(ConformanceVerdict, DeviationThatIsGoneIsStale) {
@@ -178,7 +178,7 @@ TEST(ConformanceSuite, FaultOfAnEngineIsAFailedMeasurementWithItsMessage) {
                                    {.dt = 0.5, .options = {}, .effort = Effort::kQuick, .robot = nullptr});
     ASSERT_EQ(run.measurements.size(), 1U);
     EXPECT_EQ(run.measurements[0].quantity, "ran to its end");
-    EXPECT_EQ(verdict_on(info.name, run.measurements[0]), Verdict::kFail);
+    EXPECT_EQ(status_of(info.name, run.measurements[0]), CheckStatus::kFail);
     EXPECT_NE(run.measurements[0].note.find("dt is 0.5 s"), std::string::npos);
   }
 }
@@ -216,12 +216,12 @@ TEST(ConformanceSuite, ADeviationOfAnotherRobotHasNoBound) {
   found.quantity = "error of the acceleration, relative";
   found.value = 1.2;
   found.tolerance = 1e-6;
-  EXPECT_EQ(verdict_on("ode", found), Verdict::kFail);
+  EXPECT_EQ(status_of("ode", found), CheckStatus::kFail);
   found.of_stand_in = false;
-  EXPECT_EQ(verdict_on("ode", found), Verdict::kDeviation);
-  EXPECT_EQ(verdict_on("mujoco", found), Verdict::kFail);
+  EXPECT_EQ(status_of("ode", found), CheckStatus::kDeviation);
+  EXPECT_EQ(status_of("mujoco", found), CheckStatus::kFail);
   found.value = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(verdict_on("ode", found), Verdict::kFail);
+  EXPECT_EQ(status_of("ode", found), CheckStatus::kFail);
 }
 
 TEST(ConformanceSuite, AnEngineThatIsNotThereHasNoKnownDeviations) {
@@ -248,7 +248,7 @@ TEST(ConformanceSuite, EnginesAgreeOnFallAndHeldPush) {
   for (const EngineReport& report : reports)
     for (const SceneReport& scene : report.scenes)
       for (const Measurement& found : scene.run.measurements)
-        if (verdict_on(report.engine, found) == Verdict::kFail) ADD_FAILURE() << sentence(report.engine, found);
+        if (status_of(report.engine, found) == CheckStatus::kFail) ADD_FAILURE() << sentence(report.engine, found);
 }
 
 // The questions of the suite, line by line: nothing is asked less, and no closed form gives another figure.

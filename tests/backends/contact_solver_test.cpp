@@ -16,7 +16,7 @@ constexpr double kDt = 0.002;
 constexpr int kSweeps = 200;
 constexpr double kSettled = 2e-4;  // what that many sweeps leave where contacts slide [m/s]
 constexpr double kBlow = 1e-3;     // and where eight contacts of two stiff legs open and slide in one blow [m/s]
-constexpr Softness kRigid = {.erp = 0.5, .cfm = 1e-6};
+constexpr ConstraintSoftness kRigid = {.erp = 0.5, .cfm = 1e-6};
 
 // A robot over the ground, its mass matrix factored, its contacts added.
 struct Step {
@@ -82,13 +82,13 @@ struct Step {
 RobotState sunk_sledge() { return test::state_of(*test::sledge(), {0.0, 0.0, 0.1 - 1e-5}); }
 
 TEST(ContactSolver, SpringAndDamperAreTakenImplicitly) {
-  const Softness soft = spring_damper(25000.0, 200.0, kDt);
+  const ConstraintSoftness soft = spring_damper(25000.0, 200.0, kDt);
   EXPECT_DOUBLE_EQ(soft.erp, 50.0 / 250.0);
   EXPECT_DOUBLE_EQ(soft.cfm, 1.0 / 250.0);
 }
 
 TEST(ContactSolver, NeitherSpringNorDamperIsSoftAndFinite) {
-  const Softness nothing = spring_damper(0.0, 0.0, kDt);
+  const ConstraintSoftness nothing = spring_damper(0.0, 0.0, kDt);
   EXPECT_EQ(nothing.erp, 0.0);
   EXPECT_GT(nothing.cfm, 1e8);
   EXPECT_LT(nothing.cfm, 1e10);

@@ -88,7 +88,7 @@ TEST_P(EngineHumanContact, SkinIsTheDampedSpringOfTheSceneInMotionWhateverTheSte
     HumanJoints velocities = HumanJoints::Zero();
     velocities.row(0).setConstant(-0.5);
     backend->set_partner(hand_before_sledge(flying, 0.0), velocities);
-    const Skin skin = scene.human.capsules[0].skin;
+    const ContactCompliance skin = scene.human.capsules[0].skin;
     double impulse = 0.0, peak = 0.0, expected_peak = 0.0, x = 0.0, v = 0.5;  // depth and its rate, fine steps
     for (int i = 0; i < static_cast<int>(std::lround(0.03 / dt)); ++i) {
       backend->step(test::no_torque(*scene.robot));
@@ -175,7 +175,7 @@ TEST_P(EngineHumanContact, SkinOfTwoPointsOfOneCapsuleIsOneSkin) {
 TEST_P(EngineHumanContact, PeakOfABlowOnAMovingLinkDoesNotDependOnTheStep) {
   constexpr double kArm = 0.3, kSpeed = 0.3;
   const double mass = (test::kWheelInertia + test::kWheelArmature) / (kArm * kArm);
-  const Skin skin = scene.human.capsules[0].skin;
+  const ContactCompliance skin = scene.human.capsules[0].skin;
   double expected = 0.0, gap = 0.0, v = -kSpeed, h = 1e-6;
   for (int i = 0; i < 100000; ++i) {
     const double f = std::max(0.0, -skin.stiffness * gap - skin.damping * v);
@@ -264,7 +264,7 @@ TEST_P(EngineHumanContact, PartnerThatIsTeleportedTouchesAsOneThatWasThere) {
   const double depth = 0.001;
   backend->set_partner(hand_before_sledge(backend->state(), -depth), HumanJoints::Zero());
   run(scene.dt);
-  const Skin& skin = scene.human.capsules[0].skin;
+  const ContactCompliance& skin = scene.human.capsules[0].skin;
   EXPECT_LT(force_of(*backend, ContactSide::kHuman).norm(), 3.0 * skin.stiffness * depth);  // two spheres
   EXPECT_GT(force_of(*backend, ContactSide::kHuman).norm(), skin.stiffness * depth);
 }

@@ -66,7 +66,7 @@ class ClusterWork : public testing::Test {
 
   test::ScratchFolder folder_;
   std::string run_ = folder_ / "run";
-  StopSign stop_;
+  StopToken stop_;
   Progress quiet_{Progress::Style::kQuiet};
   PlanSummary summary_;
 };

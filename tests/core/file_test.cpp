@@ -132,13 +132,13 @@ TEST(Inside, RefusesLinksBelowTheFolderAndFollowsTheFolderItself) {
   std::filesystem::create_symlink(folder / "nowhere", folder / "run/dangling.md");
   std::filesystem::create_symlink(folder / "run/real", folder / "run/traces");
   std::filesystem::create_symlink(folder / "run", folder / "link");
-  EXPECT_EQ(inside(folder / "run", "real/a.npz"), folder / "run/real/a.npz");
-  EXPECT_EQ(inside(folder / "link", "new.md"), folder / "link/new.md");
-  EXPECT_EQ(thrown_message<StorageError>([&] { static_cast<void>(inside(folder / "run", "table.md")); }),
+  EXPECT_EQ(join_without_links(folder / "run", "real/a.npz"), folder / "run/real/a.npz");
+  EXPECT_EQ(join_without_links(folder / "link", "new.md"), folder / "link/new.md");
+  EXPECT_EQ(thrown_message<StorageError>([&] { static_cast<void>(join_without_links(folder / "run", "table.md")); }),
             "cannot write '" + (folder / "run/table.md") + "': '" + (folder / "run/table.md") +
                 "' is a symbolic link and may lead out of the folder; remove it");
   for (const char* name : {"dangling.md", "traces/a.npz"})
-    EXPECT_NE(thrown_message<StorageError>([&] { static_cast<void>(inside(folder / "run", name)); }),
+    EXPECT_NE(thrown_message<StorageError>([&] { static_cast<void>(join_without_links(folder / "run", name)); }),
               "(nothing was thrown)")
         << name;
 }

@@ -27,7 +27,7 @@ TEST(WithShortNames, CutsNoCharacterInTwo) {
   std::string name;
   for (int i = 0; i < 400; ++i) name += "ü";
   for (std::size_t most = 20; most < 24; ++most)
-    EXPECT_EQ(shown(with_short_names(name, most)).find("\\x"), std::string::npos) << most;
+    EXPECT_EQ(excerpt(with_short_names(name, most)).find("\\x"), std::string::npos) << most;
 }
 
 }  // namespace

@@ -6,35 +6,35 @@ namespace duet {
 namespace {
 
 TEST(Shown, LeavesPlainTextAlone) {
-  EXPECT_EQ(shown(""), "");
-  EXPECT_EQ(shown("hug 17_04 'x'"), "hug 17_04 'x'");
-  EXPECT_EQ(shown("ü 日本 🤝"), "ü 日本 🤝");
+  EXPECT_EQ(excerpt(""), "");
+  EXPECT_EQ(excerpt("hug 17_04 'x'"), "hug 17_04 'x'");
+  EXPECT_EQ(excerpt("ü 日本 🤝"), "ü 日本 🤝");
 }
 
 TEST(Shown, EscapesWhatMovesOrRecoloursTheTerminal) {
-  EXPECT_EQ(shown("\x1b[31mred\x1b[0m"), "\\x1b[31mred\\x1b[0m");
-  EXPECT_EQ(shown("a\nb\tc\rd\x07\x7f"), "a\\nb\\tc\\x0dd\\x07\\x7f");
-  EXPECT_EQ(shown("\xc2\x9b"
-                  "31m"),
+  EXPECT_EQ(excerpt("\x1b[31mred\x1b[0m"), "\\x1b[31mred\\x1b[0m");
+  EXPECT_EQ(excerpt("a\nb\tc\rd\x07\x7f"), "a\\nb\\tc\\x0dd\\x07\\x7f");
+  EXPECT_EQ(excerpt("\xc2\x9b"
+                    "31m"),
             "\\x9b31m");  // the control sequence introducer in one character
-  EXPECT_EQ(shown("abc\u202e\u2066\u2028"), "abc\\u202e\\u2066\\u2028");
-  EXPECT_EQ(shown(std::string_view("a\0b", 3)), "a\\x00b");
+  EXPECT_EQ(excerpt("abc\u202e\u2066\u2028"), "abc\\u202e\\u2066\\u2028");
+  EXPECT_EQ(excerpt(std::string_view("a\0b", 3)), "a\\x00b");
 }
 
 TEST(Shown, EscapesBytesThatAreNotUtf8) {
-  for (const char* bad : {"\xff", "\xc3", "\x80"}) EXPECT_EQ(shown(bad).size(), 4u) << shown(bad);
-  EXPECT_EQ(shown("\xc0\xaf"), "\\xc0\\xaf");
-  EXPECT_EQ(shown("\xed\xa0\x80"), "\\xed\\xa0\\x80");
-  EXPECT_EQ(shown("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");
+  for (const char* bad : {"\xff", "\xc3", "\x80"}) EXPECT_EQ(excerpt(bad).size(), 4u) << shown(bad);
+  EXPECT_EQ(excerpt("\xc0\xaf"), "\\xc0\\xaf");
+  EXPECT_EQ(excerpt("\xed\xa0\x80"), "\\xed\\xa0\\x80");
+  EXPECT_EQ(excerpt("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");
 }
 
 TEST(Shown, CutsAtACharacterAndCountsTheDots) {
-  EXPECT_EQ(shown("0123456789", 10), "0123456789");
-  EXPECT_EQ(shown("0123456789a", 10), "0123456...");
-  EXPECT_EQ(shown("01234ü89abc", 10), "01234ü...");
-  EXPECT_EQ(shown("012345ü9abc", 10), "012345...");
-  EXPECT_EQ(shown("01234\x1b\x1b\x1b", 10), "01234...");
-  for (std::size_t size = 0; size < 300; ++size) EXPECT_LE(shown(std::string(size, '\x1b')).size(), kShown);
+  EXPECT_EQ(excerpt("0123456789", 10), "0123456789");
+  EXPECT_EQ(excerpt("0123456789a", 10), "0123456...");
+  EXPECT_EQ(excerpt("01234ü89abc", 10), "01234ü...");
+  EXPECT_EQ(excerpt("012345ü9abc", 10), "012345...");
+  EXPECT_EQ(excerpt("01234\x1b\x1b\x1b", 10), "01234...");
+  for (std::size_t size = 0; size < 300; ++size) EXPECT_LE(excerpt(std::string(size, '\x1b')).size(), kShown);
 }
 
 TEST(Printable, KeepsLinesAndEscapesTheRest) {

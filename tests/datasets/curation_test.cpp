@@ -18,7 +18,7 @@ using ::testing::IsEmpty;
 
 InteractionClip good() { return synthesize(Task::kHandshake, {.seed = 11}); }
 
-const CriterionFinding& finding(const CurationVerdict& verdict, std::string_view name) {
+const CriterionFinding& finding(const CurationResult& verdict, std::string_view name) {
   return *std::ranges::find_if(verdict.findings, [&](const CriterionFinding& f) { return f.criterion->name == name; });
 }
 
@@ -36,7 +36,7 @@ TEST(Curation, EveryTaskAsSynthesisedPassesAllGates) {
 TEST(Curation, AJointThatJumpsIsATrackingError) {
   InteractionClip clip = good();
   for (const int t : {100, 102, 104}) clip.a.joints.frame(t).col(kLeftHand) += Eigen::Vector3d(0.0, 0.0, 1.5);
-  const CurationVerdict verdict = curate(clip);
+  const CurationResult verdict = curate(clip);
   EXPECT_FALSE(finding(verdict, "joint_speed").passed);
   EXPECT_NEAR(finding(verdict, "joint_speed").worst_frame, 102, 3);
   EXPECT_THAT(verdict.refused_by(), ElementsAre(Gate::kMotionFidelity));

@@ -9,8 +9,8 @@
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/execution/run_inputs.h"
-#include "duet/experiment/plan/bodies.h"
 #include "duet/experiment/plan/clips.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "tests/execution/verified_run.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
@@ -84,7 +84,7 @@ TEST_F(KeptRun, ADescriptorWithACardOfItsOwnStaysWhereItIs) {
   write_file(scratch_ / "here/twist2_1017_20k.onnx", "a network");
   Suite suite = load_suite(scratch_ / "here/suite.yaml");
   suite.controllers = {{"mine", scratch_ / "here/mine.yaml", {}}, {"plain", scratch_ / "here/plain.yaml", {}}};
-  const KeptSuite kept = kept_suite(suite, scratch_ / "run");
+  const ArchivedSuite kept = archive_inputs(suite, scratch_ / "run");
   EXPECT_EQ(kept.suite.controllers[0].use, "../here/mine.yaml");
   EXPECT_EQ(kept.suite.controllers[1].use, "inputs/controllers/plain/plain.yaml");
   for (const RunInput& input : kept.inputs) EXPECT_FALSE(input.of == "controller mine" && input.kept) << input.role;
@@ -129,7 +129,7 @@ TEST_F(KeptRun, AKeptFileThatChangedIsNamedWithBothDigests) {
 
 TEST_F(KeptRun, KeepsADescriptorWithTheProgramBesideIt) {
   Suite suite = load_suite(scratch_ / "here/suite.yaml", {{"policies", "[wave_policy.yaml]"}});
-  const KeptSuite kept = kept_suite(suite, scratch_ / "run");
+  const ArchivedSuite kept = archive_inputs(suite, scratch_ / "run");
   const std::string place = "inputs/policies/" + suite.policies[0].name + "/";
   EXPECT_EQ(kept.suite.policies[0].use, place + "wave_policy.yaml");
   keep_inputs(kept, scratch_ / "run");

@@ -91,7 +91,7 @@ TEST(Runner, StopsWhenDecidedAtTheSameEpisodeWhateverTheThreadsAndGoesOnToTheFul
   const test::ScratchFolder folder;
   const RunSummary one = run(decidable_suite(), folder / "one", until_decided(1));
   ASSERT_TRUE(one.decided.has_value());
-  EXPECT_EQ(one.decided->decision.pairs.at(0).verdict, PairVerdict::kBetter);
+  EXPECT_EQ(one.decided->decision.pairs.at(0).verdict, SequentialDecision::kBetter);
   EXPECT_EQ(one.end, RunEnd::kComplete);
   EXPECT_EQ(one.planned, 24);
   EXPECT_LT(one.run, 24);

@@ -8,7 +8,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/execution/runner.h"
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/policies/catalogue/registry.h"
 #include "tests/experiment/fixtures.h"
@@ -74,7 +74,7 @@ TEST(SecondRobot, AControllerWhoseRobotHasNoJointOfTheClipsIsRefused) {
   write_file(folder / "mine.yaml", descriptor("t1"));
   Suite suite = test::playback_suite();
   suite.controllers = {SuiteController{.name = "mine", .use = folder / "mine.yaml"}};
-  EXPECT_EQ(thrown_message<InputError>([&] { const Bodies bodies(suite); }),
+  EXPECT_EQ(thrown_message<InputError>([&] { const Embodiments bodies(suite); }),
             "controller 'mine' runs on robot 't1', which has no joint in common with 'g1', the robot of the clips: "
             "expected a suite with 'robot: t1'");
 }

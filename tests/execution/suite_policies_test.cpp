@@ -10,7 +10,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/execution/runner.h"
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/plan/run_identity.h"
 #include "duet/policies/catalogue/registry.h"
@@ -129,14 +129,14 @@ TEST(SuitePolicies, ProgramsThatAreNotAllowedAreRefusedByNameAndNothingIsMade) {
   write_file(folder / "evil.yaml", process_descriptor("evil", "command: [/bin/sh, -c, \"touch PWNED\"]\n"));
   write_file(folder / "far.yaml", process_descriptor("far", "socket: example.org:7000\n"));
   Suite suite = with_policies("[" + (folder / "evil.yaml") + ", " + (folder / "far.yaml") + ", replay]");
-  const std::string message = test::thrown_message<InputError>([&] { Bodies bodies(suite); });
+  const std::string message = test::thrown_message<InputError>([&] { Embodiments bodies(suite); });
   EXPECT_THAT(message,
               HasSubstr("expected --allow-programs, or a folder in DUET_TRUSTED_FOLDERS, for: policy 'evil' of " +
                         (folder / "evil.yaml") + " runs '/bin/sh -c touch PWNED' in '"));
   EXPECT_THAT(message, HasSubstr("; policy 'far' of " + (folder / "far.yaml") + " connects to 'example.org:7000'"));
-  EXPECT_NO_THROW(Bodies(suite, {}, {"evil", "far"}));  // what is not run needs no leave
+  EXPECT_NO_THROW(Embodiments(suite, {}, {"evil", "far"}));  // what is not run needs no leave
   suite.allow_programs = true;
-  EXPECT_NO_THROW(Bodies{suite});
+  EXPECT_NO_THROW(Embodiments{suite});
 }
 
 TEST(SuitePolicies, ATrustedFolderAllowsWhatLiesInItAndNoLinkToIt) {
@@ -152,7 +152,7 @@ TEST(SuitePolicies, ATrustedFolderAllowsWhatLiesInItAndNoLinkToIt) {
   EXPECT_FALSE(in_trusted_folder(other / "link.yaml"));    // its program would run in the other folder
   EXPECT_FALSE(in_trusted_folder(trusted / "link.yaml"));  // somebody else's text
   EXPECT_FALSE(in_trusted_folder(trusted / "nowhere.yaml"));
-  EXPECT_NO_THROW(Bodies(with_policies("[" + (trusted / "deep/mine.yaml") + "]")));
+  EXPECT_NO_THROW(Embodiments(with_policies("[" + (trusted / "deep/mine.yaml") + "]")));
   setenv("DUET_TRUSTED_FOLDERS", (trusted / "deep").c_str(), 1);
   EXPECT_TRUE(in_trusted_folder(trusted / "deep/mine.yaml"));
   setenv("DUET_TRUSTED_FOLDERS", (trusted / "dee").c_str(), 1);
@@ -210,7 +210,7 @@ TEST(SuitePolicies, APolicyWhoseNetworkIsNotHereIsAbsentAndOthersGoOn) {
 }
 
 TEST(SuitePolicies, EveryBodyHasAMakerOfEveryPolicy) {
-  const Bodies bodies(with_policies("[replay, {name: second, use: replay}]"), {}, {"replay"});
+  const Embodiments bodies(with_policies("[replay, {name: second, use: replay}]"), {}, {"replay"});
   EXPECT_EQ(bodies.policy("pd", "second")->make()->name(), "replay");
   EXPECT_EQ(bodies.policy("pd", "null")->make()->name(), "null");
   EXPECT_NE(bodies.policy("pd", "second")->make(), bodies.policy("pd", "second")->make());

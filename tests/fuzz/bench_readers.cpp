@@ -66,7 +66,7 @@ void plan(const Suite& suite) {
   std::vector<std::string> controllers, policies;
   for (const SuiteController& controller : suite.controllers) controllers.push_back(controller.name);
   for (const SuitePolicy& policy : suite.policies) policies.push_back(policy.name);
-  Bodies bodies(suite, controllers, policies);
+  Embodiments bodies(suite, controllers, policies);
   bodies.take_clips(clips_of(suite));
   const EpisodePlan planned(suite, bodies);
   for (std::int64_t i = 0; i < planned.size(); ++i) (void)planned.at(i);

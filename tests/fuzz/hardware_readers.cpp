@@ -11,7 +11,7 @@
 #include "duet/hardware/guard/robot_connection.h"
 #include "duet/hardware/log/run_log.h"
 #include "duet/hardware/safety/limiter_setup_json.h"
-#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/twin/fakes.h"
 #include "duet/hardware/wire/odometry_source.h"
 #include "tests/fuzz/reader.h"
 
@@ -49,7 +49,7 @@ void read_lcm(std::string_view bytes) {
   ArmAction arms;
   PdTargets targets;
   BodyControlData body;
-  HomieStandIn homie;
+  FakeHomie homie;
   homie.receive(datagram(bytes), 1.0);
   refuse_unless(decode(datagram(bytes), pedal).refusal.empty() || decode(datagram(bytes), arms).refusal.empty() ||
                 decode(datagram(bytes), targets).refusal.empty() || decode(datagram(bytes), body).refusal.empty());

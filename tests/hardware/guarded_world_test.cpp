@@ -25,7 +25,7 @@ class AheadReference final : public ReferenceSource {
  public:
   explicit AheadReference(double goal) : goal_(goal) {}
   void begin(const RobotState& start) override { reference_ = {start.X_WB, start.q}; }
-  const Reference* at(const Present& present) override {
+  const Reference* at(const TickView& present) override {
     if (present.tick == 50) {
       reference_.X_WB.p += reference_.X_WB.R * Eigen::Vector3d(goal_, 0.0, 0.0);
       reference_.q[test::g1()->roles.arms[0][3]] += 0.5;

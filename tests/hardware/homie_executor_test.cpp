@@ -6,7 +6,7 @@
 
 #include <thread>
 
-#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/twin/fakes.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
 
@@ -26,7 +26,7 @@ LcmPlace own_group() {
 }
 
 // Whatever waits in the group, to the stand-in; how many datagrams.
-long hear(LcmChannel& channel, HomieStandIn& homie, double now) {
+long hear(LcmChannel& channel, FakeHomie& homie, double now) {
   LcmBuffer buffer;
   bool own = false;
   long heard = 0;
@@ -49,7 +49,7 @@ LowCommandFrame frame_with_arms(float first) {
 TEST(HomieExecutor, SaysNothingBeforeItIsOpened) {
   LcmChannel listener(own_group());
   HomieExecutor executor(own_group(), 0.74, kGuardDt);
-  HomieStandIn homie;
+  FakeHomie homie;
   executor.write(frame_with_arms(0.1f));
   executor.send({0.2, 0.0, 0.0, 0.74});
   EXPECT_EQ(hear(listener, homie, 0.0), 0);
@@ -58,7 +58,7 @@ TEST(HomieExecutor, SaysNothingBeforeItIsOpened) {
 TEST(HomieExecutor, TellsVelocityAndFourteenArmJointsInTheirOrder) {
   LcmChannel listener(own_group());
   HomieExecutor executor(own_group(), 0.74, kGuardDt);
-  HomieStandIn homie;
+  FakeHomie homie;
   executor.open();
   executor.write(frame_with_arms(0.1f));
   executor.send({0.2, -0.1, 0.3, 0.7});
@@ -75,7 +75,7 @@ TEST(HomieExecutor, TellsVelocityAndFourteenArmJointsInTheirOrder) {
 TEST(HomieExecutor, SpeaksFiftyTimesASecondAndDampingKeepsTheArms) {
   LcmChannel listener(own_group());
   HomieExecutor executor(own_group(), 0.74, kGuardDt);
-  HomieStandIn homie;
+  FakeHomie homie;
   executor.open();
   LowCommandFrame damping{};
   long heard = 0;
@@ -95,7 +95,7 @@ TEST(HomieExecutor, SpeaksFiftyTimesASecondAndDampingKeepsTheArms) {
 
 TEST(HomieExecutor, SaysGoodbyeWithAVelocityOfNought) {
   LcmChannel listener(own_group());
-  HomieStandIn homie;
+  FakeHomie homie;
   {
     HomieExecutor executor(own_group(), 0.74, kGuardDt);
     executor.open();
@@ -114,7 +114,7 @@ TEST(HomieExecutor, HearsOfHomieByItsEchoAlone) {
   EXPECT_EQ(executor.heard_at(), kNever);
   EXPECT_THAT(executor.complaint(), HasSubstr("has not been heard"));
   LcmBuffer buffer;
-  robot.send(std::span<const std::byte>(buffer).first(HomieStandIn::write_echo(RobotReading(), 1, buffer)));
+  robot.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
   executor.poll(2.0);
   EXPECT_EQ(executor.heard_at(), 2.0);
   EXPECT_EQ(executor.foreign_writers(1), 0);
@@ -128,7 +128,7 @@ TEST(HomieExecutor, OneWriterIsHomiesAndMoreAreForeign) {
   EXPECT_EQ(executor.foreign_writers(0), 0);
   LcmChannel robot(own_group());
   LcmBuffer buffer;
-  robot.send(std::span<const std::byte>(buffer).first(HomieStandIn::write_echo(RobotReading(), 1, buffer)));
+  robot.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
   executor.poll(1.0);
   EXPECT_EQ(executor.complaint(), "expected one writer of commands, HOMIE's controller, found 0");
 }
@@ -152,8 +152,8 @@ TEST(HomieExecutor, AnotherWhoSteersHomieIsForeign) {
 }
 
 // T11: what HOMIE's processes would take without a word, seen by the stand-in.
-TEST(HomieStandIn, NoticesAWrongFingerprintAndASwappedChannel) {
-  HomieStandIn homie;
+TEST(FakeHomie, NoticesAWrongFingerprintAndASwappedChannel) {
+  FakeHomie homie;
   LcmBuffer buffer;
   const std::size_t size = encode(ArmAction{{{0.5}}}, 1, buffer);
   std::vector<std::byte> swapped(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size));
@@ -197,7 +197,7 @@ class ThroughHomie final : public FrameTransport {
       twin_.obey(frame);
       const auto& v = homie.velocity();
       twin_.obey(VelocityCommand{v[0], v[1], v[2], v[3]});
-      robot_.send(std::span<const std::byte>(buffer).first(HomieStandIn::write_echo(RobotReading(), 1, buffer)));
+      robot_.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
     }
     twin_.step(kGuardDt);
     twin_.write_state(state_);
@@ -218,7 +218,7 @@ class ThroughHomie final : public FrameTransport {
   HomieExecutor& executor() { return executor_; }
 
   bool alive = true;
-  HomieStandIn homie;
+  FakeHomie homie;
 
  private:
   TwinModel& twin_;

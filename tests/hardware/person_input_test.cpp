@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "duet/core/file.h"
-#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/twin/fakes.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"

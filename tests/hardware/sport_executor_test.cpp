@@ -6,7 +6,7 @@
 #include <deque>
 #include <limits>
 
-#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/twin/fakes.h"
 #include "duet/hardware/wire/low_level_frame.h"
 #include "tests/hardware/guarded_twin.h"
 
@@ -19,7 +19,7 @@ constexpr double kDt = 0.002;
 
 class MemorySport final : public SportWire {
  public:
-  explicit MemorySport(SportStandIn& service) : service_(service) {}
+  explicit MemorySport(FakeSport& service) : service_(service) {}
   bool take(RpcResponse& response) override {
     if (waiting_.empty()) return false;
     response = waiting_.front();
@@ -51,7 +51,7 @@ class MemorySport final : public SportWire {
   std::vector<LowCommandFrame> frames;
 
  private:
-  SportStandIn& service_;
+  FakeSport& service_;
   std::deque<RpcResponse> waiting_;
 };
 
@@ -76,7 +76,7 @@ struct SportTrial {
     for (double left = seconds; left > 0.5 * kDt; left -= kDt) tick(frame, velocity, state);
   }
 
-  SportStandIn service{neutral_stance()};
+  FakeSport service{neutral_stance()};
   MemorySport wire{service};
   SportExecutor executor{wire, kDt};
 };
@@ -92,7 +92,7 @@ TEST(SportExecutor, AsksNothingButItsStateBeforeItIsOpened) {
 }
 
 TEST(SportExecutor, AMachineThatAnswersAndDoesNotWalkIsNotHeard) {
-  SportStandIn damped(neutral_stance(), 1);
+  FakeSport damped(neutral_stance(), 1);
   MemorySport wire(damped);
   SportExecutor executor(wire, kDt);
   for (; wire.now < 1.0; wire.now += kDt) executor.poll(wire.now);
@@ -170,8 +170,8 @@ TEST(SportExecutor, ClosingStopsAndLeavesTheArms) {
   EXPECT_FALSE(trial.wire.open);
 }
 
-TEST(SportStandIn, RefusesFramesAndCallsThatAreWrong) {
-  SportStandIn service(neutral_stance());
+TEST(FakeSport, RefusesFramesAndCallsThatAreWrong) {
+  FakeSport service(neutral_stance());
   LowCommandFrame frame = targets(0.1f);
   service.obey_arms(frame);
   EXPECT_EQ(service.refused(), 1);  // no checksum

@@ -62,7 +62,7 @@ class Ahead final : public ReferenceSource {
  public:
   explicit Ahead(double goal) : goal_(goal) {}
   void begin(const RobotState& start) override { reference_ = {start.X_WB, start.q}; }
-  const Reference* at(const Present& present) override {
+  const Reference* at(const TickView& present) override {
     if (present.tick == 50) reference_.X_WB.p.x() += goal_;
     return &reference_;
   }

@@ -43,7 +43,7 @@ TEST(ContactSafety, NothingHappenedWithoutContact) {
   EXPECT_EQ(result.peak_force, 0.0);
   EXPECT_EQ(result.impulse, 0.0);
   EXPECT_EQ(result.worst_ratio, 0.0);
-  EXPECT_EQ(result.verdict, ContactVerdict::kWithin);
+  EXPECT_EQ(result.verdict, ContactFinding::kWithin);
   EXPECT_TRUE(result.events.empty());
   EXPECT_EQ(result.regions.size(), 4u);
   for (const RegionContact& entry : result.regions) EXPECT_EQ(entry.contacts, 0);

@@ -41,7 +41,7 @@ TEST(ContactSafety, AConstantForceHasItsClosedForm) {
   EXPECT_NEAR(*chest.quasi_static_ratio, 50.0 / 140.0, kRounding);
   EXPECT_NEAR(*chest.transient_ratio, 50.0 / 280.0, kRounding);
   EXPECT_EQ(chest.worst_ratio, chest.quasi_static_ratio);
-  EXPECT_EQ(chest.verdict, ContactVerdict::kWithin);
+  EXPECT_EQ(chest.verdict, ContactFinding::kWithin);
   EXPECT_EQ(result.peak_force, 50.0);
   EXPECT_EQ(result.quasi_static_force, 50.0);
   EXPECT_NEAR(result.duration, 2.0, kRounding);
@@ -85,7 +85,7 @@ TEST(ContactSafety, AShortPulseIsTransientOnly) {
   EXPECT_EQ(chest.quasi_static_force, 0.0);
   EXPECT_EQ(chest.transient_force, 200.0);
   EXPECT_EQ(chest.transient_contacts, 1);
-  EXPECT_EQ(chest.verdict, ContactVerdict::kWithin);  // over 140 N, but not held
+  EXPECT_EQ(chest.verdict, ContactFinding::kWithin);  // over 140 N, but not held
   EXPECT_NEAR(*chest.worst_ratio, 200.0 / 280.0, kRounding);
 }
 
@@ -125,7 +125,7 @@ TEST(ContactSafety, ABlowInALongContactIsHeldAgainstTheTransientLimit) {
   EXPECT_EQ(chest.peak_force, 300.0);
   EXPECT_EQ(chest.quasi_static_force, 20.0);
   EXPECT_EQ(chest.transient_force, 20.0);  // of the first 0.5 s
-  EXPECT_EQ(chest.verdict, ContactVerdict::kOver);
+  EXPECT_EQ(chest.verdict, ContactFinding::kOver);
   EXPECT_NEAR(*chest.worst_ratio, 300.0 / 280.0, kRounding);
 }
 
@@ -239,22 +239,22 @@ TEST(ContactSafety, ALimitThatIsReachedIsKeptAndTheNextNumberIsOver) {
     ContactLimits limits = contact_table();
     limits.regions[0] = {.region = "chest", .quasi_static_n = limit, .transient_n = limit};
     const RegionContact at = fed(1.0, pulse(kChestA, limit, 0.1, 0.9), 0.002, {}, limits).regions[0];
-    EXPECT_EQ(at.verdict, ContactVerdict::kWithin) << limit;
+    EXPECT_EQ(at.verdict, ContactFinding::kWithin) << limit;
     EXPECT_NEAR(*at.worst_ratio, 1.0, kRounding);
     const RegionContact past = fed(1.0, pulse(kChestA, limit * 1.000001, 0.1, 0.9), 0.002, {}, limits).regions[0];
-    EXPECT_EQ(past.verdict, ContactVerdict::kOver) << limit;
+    EXPECT_EQ(past.verdict, ContactFinding::kOver) << limit;
     EXPECT_GT(*past.worst_ratio, 1.0);
   }
 }
 
 TEST(ContactSafety, ATransientContactOfTheHeadIsNotAllowedHoweverLight) {
   const ContactSafetyResult brief = fed(1.0, pulse(kHead, 6.5, 0.1, 0.3));
-  EXPECT_EQ(region(brief, "head").verdict, ContactVerdict::kNotAllowed);
+  EXPECT_EQ(region(brief, "head").verdict, ContactFinding::kNotAllowed);
   EXPECT_NEAR(*region(brief, "head").worst_ratio, 1.1, kRounding);
-  EXPECT_EQ(brief.verdict, ContactVerdict::kNotAllowed);
+  EXPECT_EQ(brief.verdict, ContactFinding::kNotAllowed);
 
   const ContactSafetyResult held = fed(1.0, pulse(kHead, 6.5, 0.1, 0.9));
-  EXPECT_EQ(region(held, "head").verdict, ContactVerdict::kWithin);
+  EXPECT_EQ(region(held, "head").verdict, ContactFinding::kWithin);
   EXPECT_NEAR(*region(held, "head").worst_ratio, 0.1, kRounding);
 }
 
@@ -262,16 +262,16 @@ TEST(ContactSafety, ATransientContactOfTheHeadIsNotAllowedHoweverLight) {
 TEST(ContactSafety, ABlowInALongContactOfTheHeadIsOver) {
   const ContactSafetyResult result =
       fed(2.0, [](double t) { return std::vector{touch(kHead, t > 1.0 && t < 1.01 ? 130.0 : 5.0)}; });
-  EXPECT_EQ(region(result, "head").verdict, ContactVerdict::kOver);
+  EXPECT_EQ(region(result, "head").verdict, ContactFinding::kOver);
   EXPECT_NEAR(*region(result, "head").worst_ratio, 2.0, kRounding);
 }
 
 TEST(ContactSafety, WhatHasNoLimitIsUnlimited) {
   const ContactSafetyResult result = fed(1.0, pulse(kFoot, 1e4, 0.0, 1.0));
-  EXPECT_EQ(region(result, "foot").verdict, ContactVerdict::kUnlimited);
+  EXPECT_EQ(region(result, "foot").verdict, ContactFinding::kUnlimited);
   EXPECT_FALSE(region(result, "foot").worst_ratio);
   EXPECT_FALSE(result.worst_ratio);
-  EXPECT_EQ(result.verdict, ContactVerdict::kUnlimited);
+  EXPECT_EQ(result.verdict, ContactFinding::kUnlimited);
 }
 
 TEST(ContactSafety, PressureIsForceOverTheOverlapOfTwoSpheres) {
@@ -294,7 +294,7 @@ TEST(ContactSafety, PressureIsForceOverTheOverlapOfTwoSpheres) {
 TEST(ContactSafety, PressureIsHeldAgainstItsLimit) {
   const ContactSafetyResult result = fed(0.1, [](double) { return std::vector{touch(kChestA, 130.0, 0, 0.0)}; });
   EXPECT_NEAR(*region(result, "chest").pressure_ratio, 130.0 / 120.0, kRounding);
-  EXPECT_EQ(region(result, "chest").verdict, ContactVerdict::kOver);
+  EXPECT_EQ(region(result, "chest").verdict, ContactFinding::kOver);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "duet/core/file.h"
-#include "duet/tasks/synthesis/figure.h"
+#include "duet/tasks/synthesis/posed_body.h"
 
 namespace duet {
 namespace {

@@ -162,7 +162,7 @@ double largest_difference(const PointTracks& one, const PointTracks& other, int 
 
 TEST(TrackedClip, HidesTheMotionByCentimetresAndKeepsWhatIsKnown) {
   const InteractionClip clip = people(Task::kHandshake, {.seed = 6, .outcome = ActOutcome::kComplete});
-  const InteractionClip seen = tracked(clip, {}, 1);
+  const InteractionClip seen = add_tracker_noise(clip, {}, 1);
   EXPECT_EQ(seen.id, clip.id + "-tracked");
   EXPECT_EQ(seen.task, clip.task);
   EXPECT_EQ(seen.reactor, clip.reactor);
@@ -177,25 +177,26 @@ TEST(TrackedClip, HidesTheMotionByCentimetresAndKeepsWhatIsKnown) {
 
 TEST(TrackedClip, SeedDecides) {
   const InteractionClip clip = people(Task::kHug, {.seed = 6});
-  EXPECT_EQ(tracked(clip, {}, 1).a.joints, tracked(clip, {}, 1).a.joints);
-  EXPECT_NE(tracked(clip, {}, 1).a.joints, tracked(clip, {}, 2).a.joints);
+  EXPECT_EQ(add_tracker_noise(clip, {}, 1).a.joints, add_tracker_noise(clip, {}, 1).a.joints);
+  EXPECT_NE(add_tracker_noise(clip, {}, 1).a.joints, add_tracker_noise(clip, {}, 2).a.joints);
 }
 
 TEST(TrackedClip, EachFigureHasItsEffect) {
   const InteractionClip clip = people(Task::kHandshake, {.seed = 8, .outcome = ActOutcome::kComplete});
-  const Tracker none{.rate_hz = 50.0,
-                     .noise = 0.0,
-                     .drift = 0.0,
-                     .limb_noise = 0.0,
-                     .feet = 0.0,
-                     .low_neck = 0.0,
-                     .low_shoulders = 0.0,
-                     .hidden_within = 0.0,
-                     .lost_noise = 0.0};
-  const auto change = [&](const Tracker& tracker, int joint) {
-    return largest_difference(tracked(clip, none, 1).a.joints, tracked(clip, tracker, 1).a.joints, joint);
+  const TrackerModel none{.rate_hz = 50.0,
+                          .noise = 0.0,
+                          .drift = 0.0,
+                          .limb_noise = 0.0,
+                          .feet = 0.0,
+                          .low_neck = 0.0,
+                          .low_shoulders = 0.0,
+                          .hidden_within = 0.0,
+                          .lost_noise = 0.0};
+  const auto change = [&](const TrackerModel& tracker, int joint) {
+    return largest_difference(add_tracker_noise(clip, none, 1).a.joints, add_tracker_noise(clip, tracker, 1).a.joints,
+                              joint);
   };
-  Tracker noisy = none, drifting = none, limbs = none, lost = none, slow = none, feet = none, low = none;
+  TrackerModel noisy = none, drifting = none, limbs = none, lost = none, slow = none, feet = none, low = none;
   noisy.noise = 0.02;
   drifting.drift = 0.02;
   limbs.limb_noise = 0.02;
@@ -220,8 +221,8 @@ TEST(TrackedClip, EachFigureHasItsEffect) {
 
 TEST(TrackedClip, ImpossibleTrackersAreRefused) {
   const InteractionClip clip = people(Task::kWave);
-  const auto message = [&](const Tracker& tracker) {
-    return test::thrown_message<std::invalid_argument>([&] { (void)tracked(clip, tracker, 1); });
+  const auto message = [&](const TrackerModel& tracker) {
+    return test::thrown_message<std::invalid_argument>([&] { (void)add_tracker_noise(clip, tracker, 1); });
   };
   EXPECT_EQ(message({.rate_hz = 4.0}), "tracked clip: expected a rate of 5 to 120 Hz, found 4");
   EXPECT_EQ(message({.noise = -1.0}), "tracked clip: expected figures of 0 or more, found -1");

@@ -119,7 +119,7 @@ TEST(Plausibility, PeopleAtOnePlaceAndContactsThatAreMetresApartAreRefused) {
 
 TEST(Plausibility, AFaultThatIsTakenIsNoted) {
   const InteractionClip giants = changed(synthetic(), [](const auto& p) { return 2.0 * p; });
-  const ForeignClip read = read_foreign_clip(Npz::parse(clip_bytes(giants), "giants.npz"), Implausible::kTaken);
+  const ImportedClip read = read_foreign_clip(Npz::parse(clip_bytes(giants), "giants.npz"), Implausible::kAllowed);
   ASSERT_EQ(read.notes.size(), 2u);
   EXPECT_THAT(read.notes[0], HasSubstr("'giants.npz': person A measures"));
   EXPECT_EQ(read.clip.a.joints, giants.a.joints);
@@ -132,7 +132,7 @@ TEST(Plausibility, AClipWithoutPhasesGetsProposedOnesAndSaysSo) {
     for (int index = 0; index < 3; ++index) {
       const InteractionClip clip = synthetic(task, index);
       const Npz npz = Npz::parse(test::without_key(clip_bytes(clip), "phases"), "bare.npz");
-      const ForeignClip read = read_foreign_clip(npz);
+      const ImportedClip read = read_foreign_clip(npz);
       ASSERT_EQ(read.notes.size(), 1u);
       EXPECT_THAT(read.notes[0], HasSubstr("'bare.npz': phases: act ["));
       EXPECT_THAT(read.notes[0], HasSubstr("(proposed)"));
@@ -168,7 +168,7 @@ TEST(Plausibility, RecordedPeopleThatAreLevelledLoad) {
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     const InteractionClip clip = test::clip_of(recordings[i], level, std::to_string(i), Task::kHandshake);
     const std::string bytes = test::without_key(clip_bytes(clip), "phases");
-    const ForeignClip read = read_foreign_clip(Npz::parse(bytes, clip.id));
+    const ImportedClip read = read_foreign_clip(Npz::parse(bytes, clip.id));
     odd += read.notes.size() > 1 ? 1 : 0;
     EXPECT_LT(read.clip.phases.act_begin, read.clip.phases.act_end);
   }

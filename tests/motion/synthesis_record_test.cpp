@@ -81,7 +81,7 @@ void expect_records(std::span<const Case> cases, Likeness like) {
   }
 }
 
-TEST(SynthesisOfRecord, ClipsAreWhatTheyWere) { expect_records(kRecords, Likeness::kRehearsed); }
+TEST(SynthesisOfRecord, ClipsAreWhatTheyWere) { expect_records(kRecords, Likeness::kScripted); }
 TEST(SynthesisOfRecord, ClipsLikePeopleAreWhatTheyWere) { expect_records(kPeopleRecords, Likeness::kPeople); }
 
 }  // namespace

@@ -205,12 +205,12 @@ TEST(Resolution, VerdictOfAFixedNumberOfPairs) {
     return verdict_of(static_cast<double>(only_a - only_b) / pairs, newcombe_paired(both, only_a, only_b, 0), p_holm,
                       0.95, margin);
   };
-  EXPECT_EQ(verdict(80, 20, 0, 0.05, 0.05), PairVerdict::kBetter);
-  EXPECT_EQ(verdict(80, 0, 20, 0.01, 0.05), PairVerdict::kWorse);
-  EXPECT_EQ(verdict(80, 20, 0, 0.06, 0.05), PairVerdict::kUndecided);
-  EXPECT_EQ(verdict(2000, 5, 4, 1.0, 0.05), PairVerdict::kSame);
-  EXPECT_EQ(verdict(2000, 30, 0, 0.001, 0.05), PairVerdict::kSame);  // not zero, and too small to matter
-  EXPECT_EQ(verdict(2000, 30, 0, 0.001, 0.01), PairVerdict::kBetter);
+  EXPECT_EQ(verdict(80, 20, 0, 0.05, 0.05), SequentialDecision::kBetter);
+  EXPECT_EQ(verdict(80, 0, 20, 0.01, 0.05), SequentialDecision::kWorse);
+  EXPECT_EQ(verdict(80, 20, 0, 0.06, 0.05), SequentialDecision::kUndecided);
+  EXPECT_EQ(verdict(2000, 5, 4, 1.0, 0.05), SequentialDecision::kSame);
+  EXPECT_EQ(verdict(2000, 30, 0, 0.001, 0.05), SequentialDecision::kSame);  // not zero, and too small to matter
+  EXPECT_EQ(verdict(2000, 30, 0, 0.001, 0.01), SequentialDecision::kBetter);
 }
 
 TEST(Resolution, NeededNumbersAreTheSmallestThatShowTheDifference) {

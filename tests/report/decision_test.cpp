@@ -55,7 +55,7 @@ TEST(Decision, StopsAtTheFirstLookThatDecidesAndKeepsItsFigures) {
   const std::vector<EpisodeRow> rows = two_policies(200, 2);
   const Decision decision = decide(rows, one_by_one(200), every_ten(200), kTwo);
   const PairDecision& pair = decision.pairs.at(0);
-  EXPECT_EQ(pair.verdict, PairVerdict::kBetter);
+  EXPECT_EQ(pair.verdict, SequentialDecision::kBetter);
   EXPECT_LT(pair.rounds, 60);
   EXPECT_EQ(pair.clips, pair.rounds);
   EXPECT_EQ(pair.difference, 0.5);
@@ -87,9 +87,11 @@ TEST(Decision, SaysWorseAndTheSame) {
   DecisionOptions turned = kTwo;
   std::swap(turned.policies[0], turned.policies[1]);
   EXPECT_EQ(decide(two_policies(100, 2), one_by_one(100), every_ten(100), turned).pairs[0].verdict,
-            PairVerdict::kWorse);
-  EXPECT_EQ(decide(two_policies(400, 1), one_by_one(400), every_ten(400), kTwo).pairs[0].verdict, PairVerdict::kSame);
-  EXPECT_EQ(decide(two_policies(20, 1), one_by_one(20), every_ten(20), kTwo).pairs[0].verdict, PairVerdict::kUndecided);
+            SequentialDecision::kWorse);
+  EXPECT_EQ(decide(two_policies(400, 1), one_by_one(400), every_ten(400), kTwo).pairs[0].verdict,
+            SequentialDecision::kSame);
+  EXPECT_EQ(decide(two_policies(20, 1), one_by_one(20), every_ten(20), kTwo).pairs[0].verdict,
+            SequentialDecision::kUndecided);
 }
 
 TEST(Decision, IsSaidInASentence) {
@@ -134,8 +136,8 @@ TEST(Decision, SeveralPairsShareTheError) {
   const Decision decision = decide(rows, one_by_one(60), {20, 60}, three);
   ASSERT_EQ(decision.pairs.size(), 2U);
   EXPECT_LT(decide(rows, one_by_one(60), {20}, three).pairs[0].interval.low, alone.low);
-  EXPECT_EQ(decision.pairs[0].verdict, PairVerdict::kBetter);
-  EXPECT_EQ(decision.pairs[1].verdict, PairVerdict::kUndecided);
+  EXPECT_EQ(decision.pairs[0].verdict, SequentialDecision::kBetter);
+  EXPECT_EQ(decision.pairs[1].verdict, SequentialDecision::kUndecided);
   EXPECT_FALSE(decision.is_open("dp"));  // its pair is decided; the first goes on against replay
   EXPECT_TRUE(decision.is_open("dstar") && decision.is_open("replay"));
 }

@@ -263,8 +263,10 @@ TEST(RunPlan, ARunSaysHowManyEpisodesAreMissing) {
   run.append(episode("replay", "hug", 0, true));
   EXPECT_EQ(completeness(load_run(scratch / "run")), "");  // says nothing yet
   EXPECT_FALSE(is_partial(load_run(scratch / "run")));
-  const auto count = [](const std::vector<RunPart>& parts) { return parts.front().is_whole() ? 4 : 1 * parts.size(); };
-  RunPart part;
+  const auto count = [](const std::vector<EpisodeFilter>& parts) {
+    return parts.front().is_whole() ? 4 : 1 * parts.size();
+  };
+  EpisodeFilter part;
   part.engines = {"mujoco"};
   run.ask_for(part, 4, count);
   EXPECT_EQ(completeness(load_run(scratch / "run")), "1 of 4 episodes: the part that was asked for");
@@ -286,7 +288,7 @@ TEST(RunPlan, ARunSaysHowManyEpisodesAreMissing) {
 }
 
 TEST(RunPlan, PartsAreToldApartWhateverTheirOrder) {
-  RunPart part, same;
+  EpisodeFilter part, same;
   part.engines = {"ode", "bullet", "ode"};
   same.engines = {"bullet", "ode"};
   EXPECT_EQ(with_part(with_part({}, part), same).size(), 1U);

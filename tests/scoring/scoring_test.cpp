@@ -100,7 +100,7 @@ TEST_F(WaveThatSucceeds, ShorterThanEightFramesHasNoMetricsAndEightHas) {
 // The 18 of a recording are those of the motion that its act is, cut out and put beside the same people.
 TEST_F(WaveThatSucceeds, MetricsOfTheActAreThoseOfTheMotionThatItIs) {
   const Recording& recording = rollout_.recording;
-  const ActSource source = act_source(recording, setup_);
+  const ScoringReference source = act_source(recording, setup_);
   const int begin = recording.phases.act_begin, frames = act_frames(recording);
   ASSERT_EQ(frames, recording.phases.act_end - begin);
   PairedMotion motion;

@@ -168,19 +168,19 @@ TEST(SequentialTest, RefusesWhatIsNoDifference) {
               HasSubstr("expected a mean in (-1, 1), found -1"));
 }
 
-TEST(PairVerdict, IsReadFromTheInterval) {
-  EXPECT_EQ(verdict_of({0.01, 0.2}, 0.05), PairVerdict::kBetter);
-  EXPECT_EQ(verdict_of({-0.2, -0.01}, 0.05), PairVerdict::kWorse);
-  EXPECT_EQ(verdict_of({-0.04, 0.04}, 0.05), PairVerdict::kSame);
-  EXPECT_EQ(verdict_of({0.01, 0.04}, 0.05), PairVerdict::kSame);  // not zero, and too small to matter
-  EXPECT_EQ(verdict_of({-0.05, 0.04}, 0.05), PairVerdict::kUndecided);
-  EXPECT_EQ(verdict_of({-0.04, 0.05}, 0.05), PairVerdict::kUndecided);
-  EXPECT_EQ(verdict_of({0.0, 0.2}, 0.05), PairVerdict::kUndecided);
-  EXPECT_EQ(verdict_of({-0.2, 0.0}, 0.05), PairVerdict::kUndecided);
-  EXPECT_EQ(to_string(PairVerdict::kBetter), "better");
-  EXPECT_EQ(to_string(PairVerdict::kWorse), "worse");
-  EXPECT_EQ(to_string(PairVerdict::kSame), "same within the margin");
-  EXPECT_EQ(to_string(PairVerdict::kUndecided), "undecided");
+TEST(SequentialDecision, IsReadFromTheInterval) {
+  EXPECT_EQ(verdict_of({0.01, 0.2}, 0.05), SequentialDecision::kBetter);
+  EXPECT_EQ(verdict_of({-0.2, -0.01}, 0.05), SequentialDecision::kWorse);
+  EXPECT_EQ(verdict_of({-0.04, 0.04}, 0.05), SequentialDecision::kSame);
+  EXPECT_EQ(verdict_of({0.01, 0.04}, 0.05), SequentialDecision::kSame);  // not zero, and too small to matter
+  EXPECT_EQ(verdict_of({-0.05, 0.04}, 0.05), SequentialDecision::kUndecided);
+  EXPECT_EQ(verdict_of({-0.04, 0.05}, 0.05), SequentialDecision::kUndecided);
+  EXPECT_EQ(verdict_of({0.0, 0.2}, 0.05), SequentialDecision::kUndecided);
+  EXPECT_EQ(verdict_of({-0.2, 0.0}, 0.05), SequentialDecision::kUndecided);
+  EXPECT_EQ(to_string(SequentialDecision::kBetter), "better");
+  EXPECT_EQ(to_string(SequentialDecision::kWorse), "worse");
+  EXPECT_EQ(to_string(SequentialDecision::kSame), "same within the margin");
+  EXPECT_EQ(to_string(SequentialDecision::kUndecided), "undecided");
   EXPECT_THAT(thrown_message<std::invalid_argument>([] {
                 verdict_of({0.0, 0.0}, 0.0);
               }),

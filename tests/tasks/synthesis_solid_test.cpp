@@ -2,14 +2,14 @@
 
 #include "duet/motion/synthesis/synthesis.h"
 #include "duet/robots/human_body.h"
-#include "duet/tasks/synthesis/figure.h"
 #include "duet/tasks/synthesis/performer.h"
+#include "duet/tasks/synthesis/posed_body.h"
 
 namespace duet::synthesis {
 namespace {
 
-Figure standing(const Body& body) {
-  Figure figure;
+PosedBody standing(const Body& body) {
+  PosedBody figure;
   pose_torso(body, standing_torso(body, {}, {}, body.stand_height), figure);
   for (const int side : {0, 1})
     pose_arm(body, {figure.p.col(sided(kLeftShoulder, side)) - Eigen::Vector3d(0.0, 0.0, 0.5)}, side, figure);
@@ -18,7 +18,7 @@ Figure standing(const Body& body) {
 
 TEST(SolidParts, AreThoseOfTheSolidPartner) {
   const Body body = make_body(1.75, {});
-  const Figure figure = standing(body);
+  const PosedBody figure = standing(body);
   std::array<double, kSmplJoints> lengths{};
   for (int j = 1; j < kSmplJoints; ++j) lengths[j] = std::max(body.offset[j].norm(), 0.01);
   const HumanBody solid = make_human_body(lengths);
@@ -53,7 +53,7 @@ TEST(SolidParts, OverlapIsDepthAndWayOut) {
 
 TEST(SolidParts, AHandThatWouldGoInsideStaysOutside) {
   const Body body = make_body(1.75, {});
-  Figure own = standing(body), partner = standing(body);
+  PosedBody own = standing(body), partner = standing(body);
   partner.p.row(0).array() += 0.45;
   const std::vector<SolidPart> parts = solid_parts(body, partner);
   const Eigen::Vector3d inside = partner.p.col(kSpine3);

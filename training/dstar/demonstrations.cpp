@@ -205,7 +205,7 @@ std::vector<std::string> load_split(const std::string& path) {
     const std::string digest = line.substr(0, line.find(' '));
     if (digest.size() != 64 || digest.find_first_not_of("0123456789abcdef") != std::string::npos)
       throw InputError(fmt::format("{}:{}: expected a SHA-256 (64 hexadecimal digits) and a clip, found '{}'", path,
-                                   number, shown(line)));
+                                   number, excerpt(line)));
     digests.push_back(digest);
   }
   return digests;

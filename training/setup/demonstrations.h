@@ -19,12 +19,12 @@
 namespace duet {
 
 struct DemonstrationClips {
-  Likeness like = Likeness::kRehearsed;
+  Likeness like = Likeness::kScripted;
   int per_task = 0;
 };
 
 struct DemonstrationOptions {
-  std::vector<DemonstrationClips> clips = {{Likeness::kRehearsed, 80}, {Likeness::kPeople, 400}};
+  std::vector<DemonstrationClips> clips = {{Likeness::kScripted, 80}, {Likeness::kPeople, 400}};
   std::uint64_t seed = 880001;
   std::string pair_mode = "best";          // of PAIR (docs/retargeting.md)
   int starts = 2;                          // of each clip, drawn as A.4.4 has it

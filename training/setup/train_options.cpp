@@ -20,7 +20,7 @@ constexpr FieldRange kThreads = {1, 1024}, kCount = {1, 1e9}, kNotNegative = {0,
 
 // One of the known texts, as it is.
 template <typename Owner>
-Field<Owner> word_field(FieldWords words, const std::vector<std::string>& known, std::string Owner::*member) {
+Field<Owner> word_field(FieldDoc words, const std::vector<std::string>& known, std::string Owner::*member) {
   words.choices = known;
   return field<Owner>(
       words, fmt::format("{}", fmt::join(known, ", ")), [member](const Owner& owner) { return owner.*member; },
@@ -160,7 +160,7 @@ std::string expected_of(const FieldTable<Training>& table, const std::string& na
 // "--round-clips" -> "round_clips"; throws for a word that is no option.
 std::string option_name(const std::string& word, const std::string& what) {
   if (!word.starts_with("--"))
-    throw InputError(fmt::format("{}: expected an option of `duet train`, found '{}'", what, shown(word)));
+    throw InputError(fmt::format("{}: expected an option of `duet train`, found '{}'", what, excerpt(word)));
   std::string name = word.substr(2, word.find('=') - 2);
   std::ranges::replace(name, '-', '_');
   return name;
@@ -231,7 +231,7 @@ void check_training_option(const std::string& train, const std::string& name, co
     expected = expected_of(policy_training_fields(), name, value, what);
   }
   if (!expected.empty())
-    throw InputError(fmt::format("{}: option '{}': expected {}, found '{}'", what, name, expected, shown(value)));
+    throw InputError(fmt::format("{}: option '{}': expected {}, found '{}'", what, name, expected, excerpt(value)));
 }
 
 TrainingOptions parse_training_options(const std::string& train, const std::vector<std::string>& words,

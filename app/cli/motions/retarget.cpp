@@ -50,7 +50,8 @@ struct Retargeted {
 
 Retargeted retarget_file(const std::string& file, size_t files, const RetargetArguments& arguments,
                          const RobotModel& robot, const PairOptions& options) {
-  ForeignClip read = read_foreign_clip(Npz::load(file), arguments.as_is ? Implausible::kTaken : Implausible::kRefused);
+  ImportedClip read =
+      read_foreign_clip(Npz::load(file), arguments.as_is ? Implausible::kAllowed : Implausible::kRefused);
   const std::string suffix = replace_reactor(arguments.reactor, read.clip);
   const PairedMotion paired = retarget(read.clip, robot, options);
   const std::string path = output_path(arguments, file, files, suffix);
@@ -77,9 +78,9 @@ PairChoices choices_of(const RetargetArguments& arguments) {
 std::vector<InteractionClip> clips_to_compare(const Session& session, const RetargetArguments& arguments) {
   std::vector<InteractionClip> clips;
   for (const std::string& file : find_motion_files(arguments.inputs)) {
-    naming_file(file, [&] {
-      ForeignClip read =
-          read_foreign_clip(Npz::load(file), arguments.as_is ? Implausible::kTaken : Implausible::kRefused);
+    with_file_context(file, [&] {
+      ImportedClip read =
+          read_foreign_clip(Npz::load(file), arguments.as_is ? Implausible::kAllowed : Implausible::kRefused);
       for (const std::string& sentence : read.notes) note(session, sentence);
       if (!arguments.reactor.empty()) replace_reactor(arguments.reactor, read.clip);
       clips.push_back(read.clip);
@@ -111,13 +112,14 @@ void run_retarget(const Session& session, const RetargetArguments& arguments) {
   const RobotModel robot = load_robot(card, arguments.urdf);
   if (arguments.sweep || !arguments.compare.empty()) return run_comparison(session, arguments, robot);
   require(!arguments.output.empty(), "retarget: expected --output FOLDER, or --compare or --sweep");
-  naming_file(card, [&] { (void)make_chain(robot, options.keypoints, options.keypoint_list); });
+  with_file_context(card, [&] { (void)make_chain(robot, options.keypoints, options.keypoint_list); });
   const std::vector<std::string> files = find_motion_files(arguments.inputs);
   std::vector<Retargeted> made(files.size());
   Progress progress(session.progress());
   progress.start("retargeting", static_cast<int>(files.size()), "clips");
   parallel_for_each(static_cast<int>(files.size()), arguments.threads, [&](int i) {
-    made[i] = naming_file(files[i], [&] { return retarget_file(files[i], files.size(), arguments, robot, options); });
+    made[i] =
+        with_file_context(files[i], [&] { return retarget_file(files[i], files.size(), arguments, robot, options); });
     progress.advance();
   });
   progress.finish();

@@ -55,7 +55,7 @@ FileScore score_file(const std::string& file, const std::shared_ptr<const RobotM
     return score;
   }
   LoadedMotion loaded =
-      load_or_retarget(npz, *robot, {}, arguments.as_is ? Implausible::kTaken : Implausible::kRefused);
+      load_or_retarget(npz, *robot, {}, arguments.as_is ? Implausible::kAllowed : Implausible::kRefused);
   score.clip = score_clip(loaded.motion, robot, options);
   score.notes = std::move(loaded.notes);
   return score;
@@ -68,7 +68,7 @@ Scores score_files(const Session& session, const ScoreArguments& arguments, cons
   Progress progress(session.progress());
   progress.start("scoring", static_cast<int>(files.size()), "files");
   parallel_for_each(static_cast<int>(files.size()), arguments.threads, [&](int i) {
-    found[i] = naming_file(files[i], [&] { return score_file(files[i], robot, arguments, options); });
+    found[i] = with_file_context(files[i], [&] { return score_file(files[i], robot, arguments, options); });
     progress.advance();
   });
   progress.finish();

@@ -6,7 +6,7 @@
 #include "duet/app/cli/run_notes.h"
 #include "duet/app/command.h"
 #include "duet/core/file.h"
-#include "duet/execution/story.h"
+#include "duet/execution/report_content.h"
 #include "duet/report/ranking/comparison.h"
 #include "duet/report/ranking/golden.h"
 #include "duet/rows/folder/run_directory.h"
@@ -52,7 +52,7 @@ void run_compare(const Session& session, const CompareArguments& arguments) {
   const Run a = open_run(arguments.a);
   const Run b = open_run(arguments.b);
   const std::vector<std::string> notes = comparison_notes(arguments, a, b);
-  const Analysis analysis = naming_file(fmt::format("A = {}, B = {}", arguments.a, arguments.b), [&] {
+  const Analysis analysis = with_file_context(fmt::format("A = {}, B = {}", arguments.a, arguments.b), [&] {
     return comparison_analysis(a.rows, b.rows, arguments.options, arguments.min_effect / 100.0);
   });
   const std::string text = fmt::format("A = {}\nB = {}\n\n{}", arguments.a, arguments.b, terminal_text(analysis));
@@ -142,7 +142,7 @@ void run_check(Session& session, const GoldenArguments& arguments) {
   const std::vector<std::string> notes = completeness_notes({arguments.run}, {run});
   const std::string golden = read_text(arguments.file);
   const std::vector<GoldenDifference> differences =
-      naming_file(arguments.file, [&] { return check(golden, leaderboard(run.rows), run.info); });
+      with_file_context(arguments.file, [&] { return check(golden, leaderboard(run.rows), run.info); });
   nlohmann::json json = nlohmann::json::array();
   std::string text;
   for (const GoldenDifference& difference : differences) {

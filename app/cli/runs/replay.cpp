@@ -46,7 +46,7 @@ std::string format_of(const ReplayArguments& arguments) {
 
 std::string output_of(const ReplayArguments& arguments, const std::string& format, bool is_run) {
   if (!arguments.output.empty()) return arguments.output;
-  return is_run ? inside(arguments.sources.front(), "replay." + format) : "replay." + format;
+  return is_run ? join_without_links(arguments.sources.front(), "replay." + format) : "replay." + format;
 }
 
 // A run's folder, or one with runs in it, which load_run refuses by their names; others hold motions.
@@ -182,7 +182,8 @@ struct RateArguments {
 void run_rate(Session& session, const RateArguments& arguments) {
   const ViewerBundle viewer = load_viewer("rate");
   const Run run = open_run(arguments.run);
-  const std::string output = arguments.output.empty() ? inside(arguments.run, "rating.html") : arguments.output;
+  const std::string output =
+      arguments.output.empty() ? join_without_links(arguments.run, "rating.html") : arguments.output;
   Progress progress(session.progress());
   const ReplayContent content = rating_content(run, arguments.choice, progress);
   const std::string page = rating_page(content, viewer);

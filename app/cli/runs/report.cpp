@@ -12,7 +12,7 @@
 #include "duet/core/machine.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/execution/story.h"
+#include "duet/execution/report_content.h"
 #include "duet/replay/replay_page.h"
 #include "duet/report/page/html_report.h"
 #include "duet/report/page/run_analyses.h"
@@ -141,7 +141,7 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   FileBatch batch;  // a disk that fills up leaves no new table among old ones
   std::vector<std::string> written;
   const Writer write = [&](const std::string& name, const std::string& text, const std::string& format) {
-    written.push_back(inside(folder, name));
+    written.push_back(join_without_links(folder, name));
     batch.write(written.back(), format == "html" ? text : with_notes(format, text, notes));
   };
   for (const std::string& format : arguments.formats) {
@@ -155,7 +155,7 @@ void run_report(const Session& session, const ReportArguments& arguments) {
       write(file, text, format);
   }
   if (std::ranges::find(arguments.formats, "sqlite") != arguments.formats.end()) {  // the last that may find no room
-    written.push_back(inside(folder, "results.sqlite"));
+    written.push_back(join_without_links(folder, "results.sqlite"));
     write_database(tables.rows, written.back(), notes);
   }
   batch.put_in_place();

@@ -15,11 +15,11 @@
 #include "duet/core/machine.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/execution/report_content.h"
 #include "duet/execution/runner.h"
-#include "duet/execution/story.h"
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 #include "duet/experiment/plan/run_identity.h"
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 #include "duet/report/ranking/leaderboard_rows.h"
 
 namespace duet::cli {
@@ -61,8 +61,8 @@ constexpr double kGrace = 1.0;
 }
 
 RunSummary run_watched(Suite suite, const RunArguments& arguments, Progress& progress) {
-  const StopSign stop(arguments.options.time_limit, arguments.options.begin);
-  const StopWatch watch(stop, kGrace, end_at_once);
+  const StopToken stop(arguments.options.time_limit, arguments.options.begin);
+  const Watchdog watch(stop, kGrace, end_at_once);
   try {
     return run_suite(std::move(suite), arguments.output, arguments.options, progress);
   } catch (const StorageError& error) {

@@ -79,7 +79,7 @@ std::string engine_table(const CertifiedEngine& engine, bool all) {
                   .rows = {},
                   .label_columns = 3};
   for (const CertifiedMeasurement& entry : engine.measurements) {
-    if (!all && entry.verdict == conformance::Verdict::kPass) continue;
+    if (!all && entry.verdict == conformance::CheckStatus::kPass) continue;
     const conformance::Measurement& found = entry.found;
     table.rows.push_back({found.scene, found.quantity, std::string(conformance::to_string(entry.verdict)),
                           fmt::format("{:g}", 1e3 * found.dt), fmt::format("{:.4g}", found.value),

@@ -82,7 +82,7 @@ class GantryBackend final : public duet::PhysicsBackend {
     if (!pushes_.any()) return;
     const duet::Kinematics& kinematics = dynamics_.kinematics();
     for (int link = 0; link < static_cast<int>(pushes_.all().size()); ++link) {
-      const duet::LinkPushes::Push& push = pushes_.all()[link];
+      const duet::ExternalForces::Push& push = pushes_.all()[link];
       kinematics.point_jacobian(link, kinematics.p_WL(link) + kinematics.R_WL(link) * push.p_L, J_);
       outside_.noalias() += J_.rightCols(joints_).transpose() * push.f_W;
     }

@@ -4,9 +4,9 @@
 
 #include <exception>
 
+#include "duet/execution/report_content.h"
 #include "duet/execution/runner.h"
-#include "duet/execution/story.h"
-#include "duet/report/ranking/board.h"
+#include "duet/report/ranking/ranking.h"
 
 int main(int argc, char** argv) try {
   if (argc != 3) {
@@ -19,7 +19,7 @@ int main(int argc, char** argv) try {
   options.threads = 2;
   duet::run_suite(suite, argv[2], options, progress);
   const duet::Run run = duet::load_run(argv[2]);
-  fmt::print("{}\n", duet::board_screen(duet::tables_of(run.rows, run).board, {}));
+  fmt::print("{}\n", duet::ranking_screen(duet::tables_of(run.rows, run).board, {}));
   return 0;
 } catch (const std::exception& error) {
   fmt::print(stderr, "run_a_suite: {}\n", error.what());

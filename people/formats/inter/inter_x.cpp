@@ -60,7 +60,7 @@ std::vector<ClipPlace> find_inter_x_smplx(std::span<const std::string> paths, co
     }
   if (clips.empty())
     throw InputError(
-        fmt::format("'{}': expected two files, or a folder with P1.npz and P2.npz below it", shown(paths[0])));
+        fmt::format("'{}': expected two files, or a folder with P1.npz and P2.npz below it", excerpt(paths[0])));
   std::sort(clips.begin(), clips.end(), [](const ClipPlace& a, const ClipPlace& b) { return a.id < b.id; });
   return clips;
 }
@@ -103,7 +103,7 @@ void find_reactor(const std::string& clip, const std::string& file, RawPeople& r
   const Pickle pickle = parse_pickle(bytes, path);
   const PickleNode* order = pickle.find(pickle[pickle.root], clip);
   if (order == nullptr) {
-    raw.evidence.push_back(fmt::format("reactor: P2 (interaction_order.pkl does not name '{}')", shown(clip)));
+    raw.evidence.push_back(fmt::format("reactor: P2 (interaction_order.pkl does not name '{}')", excerpt(clip)));
     return;
   }
   std::int64_t actor = order->integer;
@@ -114,7 +114,7 @@ void find_reactor(const std::string& clip, const std::string& file, RawPeople& r
     actor = -1;
   }
   if (actor != 0 && actor != 1)
-    pickle.fail(order->offset, fmt::format("'{}': expected 0 (P1 acts) or 1 (P2 acts)", shown(clip)));
+    pickle.fail(order->offset, fmt::format("'{}': expected 0 (P1 acts) or 1 (P2 acts)", excerpt(clip)));
   raw.reactor = actor == 0 ? Person::kB : Person::kA;
   raw.evidence.push_back(fmt::format("reactor: P{} (interaction_order.pkl: P{} acts)", actor == 0 ? 2 : 1, actor + 1));
 }
@@ -259,7 +259,7 @@ std::map<std::string, std::string> read_splits(const std::string& folder) {
       line.erase(line.find_last_not_of(" \r\t") + 1);
       if (line.empty()) continue;
       if (!is_plain_name(line))
-        throw InputError(fmt::format("'{}/{}': expected names of clips, found '{}'", folder, name, shown(line)));
+        throw InputError(fmt::format("'{}/{}': expected names of clips, found '{}'", folder, name, excerpt(line)));
       split_of.emplace(line, stem_of(name));
     }
   }
@@ -365,7 +365,7 @@ NumberTable rows_of(const NumberTable& table, std::size_t person, std::size_t fi
 
 NumberTable read_h5_clip(const std::string& path, const std::string& clip) {
   Hdf5File file(path);
-  const std::string what = fmt::format("'{}': clip '{}'", shown(path), shown(clip));
+  const std::string what = fmt::format("'{}': clip '{}'", excerpt(path), excerpt(clip));
   // Looked at before the numbers are: a file of another kind has arrays of any size.
   const std::vector<std::size_t> shape = file.shape(clip);
   if (shape.size() != 3 || shape[0] == 0 || shape[1] != kH5Rows || shape[2] != kH5Row)

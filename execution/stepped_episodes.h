@@ -21,7 +21,7 @@
 namespace duet {
 
 // Which part of a suite; what is empty is the first that the suite has, of engines the first that this machine has too.
-struct LedPart {
+struct SteppedPart {
   std::string engine = {}, controller = {}, task = {}, perturbation = {};
 };
 
@@ -31,23 +31,23 @@ inline constexpr const char* kCaller = "caller";
 // The experiment that such episodes are drawn from; its policy is the caller. Throws std::invalid_argument for a name
 // that the suite does not have, MissingError for an engine or a controller that this machine lacks, InputError (clips,
 // cards, a suite of walking commands).
-std::shared_ptr<Experiment> led_experiment(Suite suite, const LedPart& part, int threads, Progress& progress);
+std::shared_ptr<Experiment> stepped_experiment(Suite suite, const SteppedPart& part, int threads, Progress& progress);
 
 // How many questions an episode asks at most.
 int questions_of(const Experiment& experiment, std::int64_t episode);
 
 // The bodies that are led: the robot alone, while the partner follows the clip, or both.
-enum class Led { kRobot, kBoth };
+enum class DrivenBodies { kRobot, kBoth };
 
 // One episode at a time, on a thread of its own. One owner, not thread-safe. A forked child has no such thread: there
 // every call throws std::runtime_error, and nothing is waited for.
-class LedEpisode {
+class SteppedEpisode {
  public:
-  explicit LedEpisode(std::shared_ptr<const Experiment> experiment, Led led = Led::kRobot)
+  explicit SteppedEpisode(std::shared_ptr<const Experiment> experiment, DrivenBodies led = DrivenBodies::kRobot)
       : experiment_(std::move(experiment)), led_(led), process_(::getpid()) {}
-  ~LedEpisode();
-  LedEpisode(const LedEpisode&) = delete;
-  LedEpisode& operator=(const LedEpisode&) = delete;
+  ~SteppedEpisode();
+  SteppedEpisode(const SteppedEpisode&) = delete;
+  SteppedEpisode& operator=(const SteppedEpisode&) = delete;
 
   // Begins an episode of the suite and ends the one before. The first question; null where it ended without one.
   // Throws std::invalid_argument for a number that is not in [0, size).
@@ -81,7 +81,7 @@ class LedEpisode {
   void require_same_process() const;
 
   std::shared_ptr<const Experiment> experiment_;  // shared by the episodes of a batch
-  Led led_;
+  DrivenBodies led_;
   pid_t process_;
   std::shared_ptr<PointTracks> partner_;         // with the episode's thread, which waits while a question is open
   std::shared_ptr<PlanQueue> queue_;             // with the episode's thread

@@ -1,4 +1,4 @@
-#include "duet/report/ranking/board.h"
+#include "duet/report/ranking/ranking.h"
 
 #include <gmock/gmock.h>
 
@@ -40,33 +40,33 @@ void add(const Arm& of, Rows& rows) {
   }
 }
 
-Board board_of(const std::vector<Arm>& arms) {
+Ranking board_of(const std::vector<Arm>& arms) {
   Rows rows;
   for (const Arm& arm : arms) add(arm, rows);
-  return board(rows, {}, {.roles = kRoles});
+  return rank_policies(rows, {}, {.roles = kRoles});
 }
 
 std::string times(int count, char digit) { return std::string(static_cast<std::size_t>(count), digit); }
 
-std::string verdict_of(const Board& board) {
+std::string verdict_of(const Ranking& board) {
   std::string text;
-  for (const std::string& sentence : board_verdict(board)) text += sentence + "\n";
+  for (const std::string& sentence : ranking_verdict(board)) text += sentence + "\n";
   return text;
 }
 
-std::vector<std::string> policies_of(const std::vector<BoardRow>& rows) {
+std::vector<std::string> policies_of(const std::vector<RankingRow>& rows) {
   std::vector<std::string> names;
-  for (const BoardRow& row : rows) names.push_back(row.policy);
+  for (const RankingRow& row : rows) names.push_back(row.policy);
   return names;
 }
 
-TEST(Board, RanksCompetitorsAlone) {
-  const Board made = board_of({{"replay", times(40, '1')},
-                               {"a", times(20, '1') + times(20, '0')},
-                               {"b", times(30, '1') + times(10, '0')},
-                               {"omni", times(38, '1') + times(2, '0')},
-                               {"null", times(40, '0'), "null"},
-                               {"b_shuffled", times(40, '0'), "shuffled"}});
+TEST(Ranking, RanksCompetitorsAlone) {
+  const Ranking made = board_of({{"replay", times(40, '1')},
+                                 {"a", times(20, '1') + times(20, '0')},
+                                 {"b", times(30, '1') + times(10, '0')},
+                                 {"omni", times(38, '1') + times(2, '0')},
+                                 {"null", times(40, '0'), "null"},
+                                 {"b_shuffled", times(40, '0'), "shuffled"}});
   EXPECT_THAT(policies_of(made.rows), ElementsAre("b", "a"));
   EXPECT_THAT(policies_of(made.references), ElementsAre("replay", "omni", "b_shuffled", "null"));
   EXPECT_EQ(made.rows[1].rank, 2U);
@@ -79,8 +79,8 @@ TEST(Board, RanksCompetitorsAlone) {
                                  "-20.0 ["));
 }
 
-TEST(Board, TheLiftIsOverTheNullArmWhereNoOtherControlIs) {
-  const Board made = board_of({{"a", times(36, '1') + times(4, '0')}, {"null", times(40, '0'), "null"}});
+TEST(Ranking, TheLiftIsOverTheNullArmWhereNoOtherControlIs) {
+  const Ranking made = board_of({{"a", times(36, '1') + times(4, '0')}, {"null", times(40, '0'), "null"}});
   EXPECT_THAT(verdict_of(made), AllOf(StartsWith("vmc with a: 90.0 ["),
                                       HasSubstr("Its lift over the best control, vmc with null (stands still), is "
                                                 "+90.0 ["),
@@ -88,19 +88,19 @@ TEST(Board, TheLiftIsOverTheNullArmWhereNoOtherControlIs) {
   EXPECT_THAT(verdict_of(board_of({{"a", times(40, '1')}})), HasSubstr("No control was run beside it"));
 }
 
-TEST(Board, TheControllersAreRankedWhereNoPolicyCompetes) {
-  const Board made = board_of({{.policy = "replay", .successes = times(40, '1'), .controller = "wbc"},
-                               {.policy = "replay", .successes = times(20, '1') + times(20, '0')}});
+TEST(Ranking, TheControllersAreRankedWhereNoPolicyCompetes) {
+  const Ranking made = board_of({{.policy = "replay", .successes = times(40, '1'), .controller = "wbc"},
+                                 {.policy = "replay", .successes = times(20, '1') + times(20, '0')}});
   EXPECT_TRUE(made.of_oracles);
   EXPECT_THAT(verdict_of(made),
               StartsWith("wbc with replay (knows the motion) is best of 2 arms that know the motion"));
 }
 
-TEST(Board, OnlyControlsAreNoCompetition) {
-  const Board made = board_of({{"null", times(40, '0'), "null"}});
+TEST(Ranking, OnlyControlsAreNoCompetition) {
+  const Ranking made = board_of({{"null", times(40, '0'), "null"}});
   EXPECT_TRUE(made.rows.empty());
-  EXPECT_THAT(board_verdict(made), ElementsAre("Nothing competes here: every arm is a control."));
-  EXPECT_FALSE(board_analysis(made).empty());
+  EXPECT_THAT(ranking_verdict(made), ElementsAre("Nothing competes here: every arm is a control."));
+  EXPECT_FALSE(ranking_analysis(made).empty());
 }
 
 TEST(BoardVerdict, FewClipsSayNothingHoweverTheyFall) {
@@ -120,7 +120,7 @@ TEST(BoardVerdict, OneIsOne) {
 }
 
 TEST(BoardVerdict, ATieIsATie) {
-  const Board made = board_of({{"a", times(40, '1')}, {"b", times(40, '1')}, {"c", times(40, '0')}});
+  const Ranking made = board_of({{"a", times(40, '1')}, {"b", times(40, '1')}, {"c", times(40, '0')}});
   EXPECT_EQ(made.rows[0].rank, 1U);
   EXPECT_EQ(made.rows[1].rank, 1U);
   EXPECT_EQ(made.rows[2].rank, 3U);
@@ -131,7 +131,7 @@ TEST(BoardVerdict, ATieIsATie) {
 TEST(BoardVerdict, ALeadThatTheExactTestDoesNotSeeIsNone) {
   // 36 of 40 against 33: six to three clips, p = .51.
   const std::string a = times(36, '1') + times(4, '0'), b = times(30, '1') + times(6, '0') + "1110";
-  const Board made = board_of({{"a", a}, {"b", b}});
+  const Ranking made = board_of({{"a", a}, {"b", b}});
   EXPECT_NEAR(made.lead->p, mcnemar_exact(6, 3), 1e-12);
   EXPECT_THAT(verdict_of(made), AllOf(StartsWith("vmc with a has the most successes of 2 competitors"),
                                       HasSubstr("these clips do not decide between the two")));
@@ -140,11 +140,11 @@ TEST(BoardVerdict, ALeadThatTheExactTestDoesNotSeeIsNone) {
 // The test and the interval are two approximations of one truth: where they differ, nobody reads "p = .03" beside "not
 // decided" without the reason.
 TEST(BoardVerdict, WhereTestAndIntervalDifferASentenceSaysWhich) {
-  BoardDifference of{.other = "b", .difference = 0.1, .interval = {0.02, 0.2}, .clips = 40, .p = 0.03};
+  RankingDifference of{.other = "b", .difference = 0.1, .interval = {0.02, 0.2}, .clips = 40, .p = 0.03};
   EXPECT_EQ(told(of, 0.95), Told::kAhead);
   of.interval.low = -0.01;
   EXPECT_EQ(told(of, 0.95), Told::kTestAlone);
-  Board made = board_of({{"a", times(36, '1') + times(4, '0')}, {"b", times(30, '1') + times(6, '0') + "1110"}});
+  Ranking made = board_of({{"a", times(36, '1') + times(4, '0')}, {"b", times(30, '1') + times(6, '0') + "1110"}});
   made.lead = of;
   made.lift = of;
   EXPECT_THAT(verdict_of(made), AllOf(HasSubstr("do not decide between the two; the exact test alone would"),
@@ -180,7 +180,7 @@ TEST(BoardVerdict, EnginesAndRolesOfAClipAreOneClip) {
       }
     }
   }
-  const Board made = board(rows, {});
+  const Ranking made = rank_policies(rows, {});
   EXPECT_EQ(made.lead->clips, 35);
   EXPECT_NEAR(made.lead->p, 0.25, 1e-12);  // three clips, not thirty episodes
   // Ten episodes a clip, all good: no surer than 35 clips.
@@ -218,7 +218,7 @@ TEST(BoardVerdict, EpisodesThatFellAreNoSuccessInAnyColumn) {
     row.outcome = Outcome::kFell;
     row.fell = true;
   }
-  EXPECT_EQ(board(rows, {}).rows[0].mean, 0.0);
+  EXPECT_EQ(rank_policies(rows, {}).rows[0].mean, 0.0);
   for (const LeaderboardEntry& entry : leaderboard(rows)) {
     EXPECT_EQ(entry.success, 0.0);
     EXPECT_EQ(entry.other_success.at("paper/paper"), 0.0);
@@ -228,14 +228,15 @@ TEST(BoardVerdict, EpisodesThatFellAreNoSuccessInAnyColumn) {
 TEST(BoardVerdict, EndsWithASuiteThatOnlyBearsTheName) {
   Rows rows;
   add({"a", times(40, '1')}, rows);
-  const Board made = board(rows, {}, {.label = "tiny 1.0.0, NOT it", .warning = "tiny 1.0.0 is NOT it.", .roles = {}});
-  EXPECT_EQ(board_verdict(made).back(), "tiny 1.0.0 is NOT it.");
-  const Analysis analysis = board_analysis(made);
+  const Ranking made =
+      rank_policies(rows, {}, {.label = "tiny 1.0.0, NOT it", .warning = "tiny 1.0.0 is NOT it.", .roles = {}});
+  EXPECT_EQ(ranking_verdict(made).back(), "tiny 1.0.0 is NOT it.");
+  const Analysis analysis = ranking_analysis(made);
   EXPECT_EQ(analysis.title, "Board: tiny 1.0.0, NOT it");
   ReportContent page;
   page.analyses = {analysis};
   for (const std::string& text : {analysis_markdown(analysis), analysis_csv(analysis), analysis_latex(analysis),
-                                  analysis_json(analysis).dump(), html_report(page, {}), board_screen(made, {})})
+                                  analysis_json(analysis).dump(), html_report(page, {}), ranking_screen(made, {})})
     EXPECT_THAT(text, HasSubstr("tiny 1.0.0 is NOT it."));
 }
 
@@ -250,9 +251,9 @@ TEST(BoardScreen, FitsATerminalWhateverIsRun) {
   for (const char* policy : {"replay", "omni"})
     for (const char* engine : {"bullet", "mujoco"})
       arms.push_back({policy, times(40, '1'), "main", engine, "a_controller_of_a_long_name"});
-  Board made = board_of(arms);
+  Ranking made = board_of(arms);
   made.suite.warning = times(300, 'x');
-  const std::string text = board_screen(made, {times(500, 'n'), "a note\nof two lines", "another", "and one more"});
+  const std::string text = ranking_screen(made, {times(500, 'n'), "a note\nof two lines", "another", "and one more"});
   std::istringstream lines(text);
   std::size_t count = 0;
   for (std::string line; std::getline(lines, line); ++count) EXPECT_LE(line.size(), kScreenColumns) << line;
@@ -262,7 +263,7 @@ TEST(BoardScreen, FitsATerminalWhateverIsRun) {
 
 TEST(BoardScreen, ShowsEveryRowWhereThereIsRoom) {
   const std::string text =
-      board_screen(board_of({{"a", times(40, '1')}, {"b", times(40, '0')}, {"null", times(40, '0'), "null"}}), {});
+      ranking_screen(board_of({{"a", times(40, '1')}, {"b", times(40, '0')}, {"null", times(40, '0'), "null"}}), {});
   EXPECT_THAT(text, AllOf(HasSubstr("\n  1  a "), HasSubstr("\n  2  b "), HasSubstr("\n  -  null (stands still) "),
                           Not(HasSubstr("more (--tables)"))));
 }

@@ -1,4 +1,4 @@
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -78,8 +78,9 @@ void require_same_facts(const SuiteController& controller) {
 
 }  // namespace
 
-Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers,
-               const std::vector<std::string>& skipped_policies, const std::map<std::string, PolicyLoader>& called) {
+Embodiments::Embodiments(const Suite& suite, const std::vector<std::string>& skipped_controllers,
+                         const std::vector<std::string>& skipped_policies,
+                         const std::map<std::string, PolicyLoader>& called) {
   require_allowed(programs_of(suite, skipped_policies), suite.allow_programs);
   const DigestReads reads(read_);
   if (suite.partner == PartnerMode::kSolid) limits_ = load_contact_limits(suite.contact_limits_file());
@@ -106,7 +107,7 @@ Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_contr
 }
 
 // Made once to see whether it can be.
-void Bodies::load_controller_of(const Suite& suite, const SuiteController& controller) {
+void Embodiments::load_controller_of(const Suite& suite, const SuiteController& controller) {
   require_same_facts(controller);
   const std::size_t place = add(suite.card_of(controller));
   const std::shared_ptr<const RobotModel> robot = bodies_[place].robot;
@@ -122,7 +123,7 @@ void Bodies::load_controller_of(const Suite& suite, const SuiteController& contr
 
 // Maps a policy made for the nominal body, by the joints' names, to a body that it does not fit. Its files were read
 // for the nominal body a moment ago; where they were not, they are broken, and what was thrown goes on.
-void Bodies::map_policy(const std::string& name, std::size_t place) {
+void Embodiments::map_policy(const std::string& name, std::size_t place) {
   const PolicyMaker& make = policies_.at({name, 0}).make;
   if (place == 0 || !make) throw;
   policies_.at({name, place}).make = [make, made_for = nominal(), body = bodies_[place].robot] {
@@ -130,7 +131,7 @@ void Bodies::map_policy(const std::string& name, std::size_t place) {
   };
 }
 
-void Bodies::add_policy(const SuitePolicy& policy, const PolicyLoader& load) {
+void Embodiments::add_policy(const SuitePolicy& policy, const PolicyLoader& load) {
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
     PolicyOnBody& entry = policies_[{policy.name, place}];
     try {
@@ -146,7 +147,7 @@ void Bodies::add_policy(const SuitePolicy& policy, const PolicyLoader& load) {
   }
 }
 
-std::size_t Bodies::add(const std::string& card) {
+std::size_t Embodiments::add(const std::string& card) {
   const auto found = std::find_if(bodies_.begin(), bodies_.end(), [&](const Body& body) { return body.card == card; });
   if (found != bodies_.end()) return static_cast<std::size_t>(found - bodies_.begin());
   bodies_.push_back({card, load_shared_robot(card), {}});
@@ -154,12 +155,12 @@ std::size_t Bodies::add(const std::string& card) {
   return bodies_.size() - 1;
 }
 
-void Bodies::take_notes(const std::vector<std::string>& notes) {
+void Embodiments::take_notes(const std::vector<std::string>& notes) {
   for (const std::string& note : notes)
     if (!contains(notes_, note)) notes_.push_back(note);
 }
 
-void Bodies::take_clips(std::vector<PairedMotion> clips) {
+void Embodiments::take_clips(std::vector<PairedMotion> clips) {
   for (std::size_t i = 1; i < bodies_.size(); ++i) {
     bodies_[i].clips = clips;
     for (PairedMotion& clip : bodies_[i].clips)
@@ -168,16 +169,16 @@ void Bodies::take_clips(std::vector<PairedMotion> clips) {
   bodies_.front().clips = std::move(clips);
 }
 
-std::size_t Bodies::place(const std::string& controller) const {
+std::size_t Embodiments::place(const std::string& controller) const {
   const auto found = place_.find(controller);
   return found == place_.end() ? 0 : found->second;
 }
 
-const std::vector<PairedMotion>& Bodies::clips(const std::string& controller) const {
+const std::vector<PairedMotion>& Embodiments::clips(const std::string& controller) const {
   return bodies_[place(controller)].clips;
 }
 
-const PolicyOnBody* Bodies::policy(const std::string& controller, const std::string& policy) const {
+const PolicyOnBody* Embodiments::policy(const std::string& controller, const std::string& policy) const {
   const auto found = policies_.find({policy, place(controller)});
   return found == policies_.end() ? nullptr : &found->second;
 }
@@ -203,13 +204,13 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
 }
 
 std::string command_line(const std::vector<std::string>& command) {
-  return shown(fmt::format("{}", fmt::join(command, " ")), kLongestCommand);
+  return excerpt(fmt::format("{}", fmt::join(command, " ")), kLongestCommand);
 }
 
 std::string action_of(const PolicyDescriptor& descriptor) {
-  if (descriptor.command.empty()) return fmt::format("connects to '{}'", shown(descriptor.socket));
+  if (descriptor.command.empty()) return fmt::format("connects to '{}'", excerpt(descriptor.socket));
   return fmt::format("runs '{}' in '{}'", command_line(descriptor.command),
-                     shown(descriptor.folder(), kLongestCommand));
+                     excerpt(descriptor.folder(), kLongestCommand));
 }
 
 }  // namespace
@@ -218,13 +219,13 @@ std::vector<NamedProgram> programs_of(const SuitePolicy& policy) {
   if (!policy.use.ends_with(".yaml")) return {};
   const PolicyDescriptor descriptor = read_policy_descriptor(policy.use);
   if (descriptor.kind != PolicyKind::kProcess) return {};
-  return {{fmt::format("policy '{}'", shown(policy.name)), policy.use, action_of(descriptor),
+  return {{fmt::format("policy '{}'", excerpt(policy.name)), policy.use, action_of(descriptor),
            in_trusted_folder(policy.use)}};
 }
 
 NamedProgram program_in(const std::string& who, const std::string& file, const std::vector<std::string>& command) {
   const std::string folder = fs::absolute(file).parent_path().lexically_normal().string();
-  return {who, file, fmt::format("runs '{}' in '{}'", command_line(command), shown(folder, kLongestCommand)),
+  return {who, file, fmt::format("runs '{}' in '{}'", command_line(command), excerpt(folder, kLongestCommand)),
           in_trusted_folder(file)};
 }
 
@@ -238,7 +239,7 @@ std::vector<NamedProgram> programs_of(const Suite& suite, const std::vector<std:
 }
 
 std::string describe(const NamedProgram& program) {
-  return fmt::format("{} of {} {}", program.who, shown(program.file, kLongestCommand), program.action);
+  return fmt::format("{} of {} {}", program.who, excerpt(program.file, kLongestCommand), program.action);
 }
 
 void require_allowed(const std::vector<NamedProgram>& programs, bool allowed) {

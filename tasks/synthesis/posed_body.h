@@ -63,7 +63,7 @@ struct ArmPose {
   double wrist = 0.0;                                // bend of the hand in the elbow's plane, as the elbow bends; [rad]
 };
 
-struct Figure {
+struct PosedBody {
   std::array<Eigen::Matrix3d, kSmplJoints> R;  // R_WJ
   Eigen::Matrix<double, 3, kSmplJoints> p;     // p_WJ
   double yaw = 0.0;
@@ -78,12 +78,12 @@ Eigen::Matrix3d rot_y(double angle);
 Eigen::Matrix3d rot_z(double angle);
 
 // Pelvis, spine, head, collars, shoulders and hips.
-void pose_torso(const Body& body, const TorsoPose& torso, Figure& figure);
+void pose_torso(const Body& body, const TorsoPose& torso, PosedBody& figure);
 Eigen::Vector3d ankle_of(const Body& body, const FootPose& foot, int side);
 // Needs the hips. The ankle must be within reach (the pelvis planner sees to it).
-void pose_leg(const Body& body, const FootPose& foot, int side, Figure& figure);
+void pose_leg(const Body& body, const FootPose& foot, int side, PosedBody& figure);
 // Needs the shoulders. A hand target beyond kArmReach of the arm's length is approached smoothly, never reached.
-void pose_arm(const Body& body, const ArmPose& arm, int side, Figure& figure);
+void pose_arm(const Body& body, const ArmPose& arm, int side, PosedBody& figure);
 
 // Hand targets up to this share of upper arm + (forearm and hand) are met exactly.
 inline constexpr double kArmReach = 0.975;
@@ -99,9 +99,9 @@ struct SolidPart {
 };
 
 // The parts of a figure whose torso is posed.
-std::vector<SolidPart> solid_parts(const Body& body, const Figure& figure);
+std::vector<SolidPart> solid_parts(const Body& body, const PosedBody& figure);
 // The hand of a figure whose arm is posed.
-SolidPart solid_hand(const Body& body, const Figure& figure, int side);
+SolidPart solid_hand(const Body& body, const PosedBody& figure, int side);
 
 // How deep two parts are in each other [m], negative: how far apart; and the unit vector that takes the first out.
 struct Overlap {
@@ -112,6 +112,6 @@ Overlap overlap_of(const SolidPart& part, const SolidPart& other);
 
 // Poses the arm like pose_arm, but so that the hand is on or outside of `partner`: the target goes out until it is.
 void pose_arm_outside(const Body& body, const ArmPose& arm, int side, const std::vector<SolidPart>& partner,
-                      Figure& figure);
+                      PosedBody& figure);
 
 }  // namespace duet::synthesis

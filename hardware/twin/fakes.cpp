@@ -1,4 +1,4 @@
-#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/twin/fakes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -48,7 +48,7 @@ JointCommand homie_command() {
 
 }  // namespace
 
-void HomieStandIn::receive(std::span<const std::byte> datagram, double now) {
+void FakeHomie::receive(std::span<const std::byte> datagram, double now) {
   const std::string_view channel = channel_of(datagram);
   PedalCommand pedal;
   ArmAction arms;
@@ -73,14 +73,14 @@ void HomieStandIn::receive(std::span<const std::byte> datagram, double now) {
   }
 }
 
-void HomieStandIn::write_command(std::uint8_t mode_machine, LowCommandFrame& frame) {
+void FakeHomie::write_command(std::uint8_t mode_machine, LowCommandFrame& frame) {
   if (joints_.q_target.size() == 0) joints_ = homie_command();
   if (arms_)
     for (int j = 0; j < kLcmArmJoints; ++j) joints_.q_target[kFirstArm + j] = arms_->act[static_cast<std::size_t>(j)];
   build_command(joints_, mode_machine, frame);
 }
 
-std::size_t HomieStandIn::write_echo(const RobotReading& reading, std::uint32_t sequence, LcmBuffer& buffer) {
+std::size_t FakeHomie::write_echo(const RobotReading& reading, std::uint32_t sequence, LcmBuffer& buffer) {
   BodyControlData body;
   for (std::size_t j = 0; j < kLcmJoints; ++j) {
     body.q[j] = static_cast<float>(reading.state.q[static_cast<Eigen::Index>(j)]);
@@ -96,7 +96,7 @@ constexpr std::int32_t kUnknownCall = 3203, kWrongParameter = 3104;
 
 }  // namespace
 
-SportStandIn::SportStandIn(JointCommand stance, int fsm)
+FakeSport::FakeSport(JointCommand stance, int fsm)
     : stance_(std::move(stance)),
       joints_(stance_),
       fsm_(fsm),
@@ -104,7 +104,7 @@ SportStandIn::SportStandIn(JointCommand stance, int fsm)
       arms_kp_(stance_.kp),
       arms_kd_(stance_.kd) {}
 
-RpcResponse SportStandIn::answer(const RpcRequest& request, double now) {
+RpcResponse FakeSport::answer(const RpcRequest& request, double now) {
   RpcResponse response{.id = request.id, .api = static_cast<std::int64_t>(request.call), .code = 0, .data = ""};
   if (request.call == SportCall::kGetFsm) {
     response.data = R"({"data":)" + std::to_string(fsm_) + "}";
@@ -125,7 +125,7 @@ RpcResponse SportStandIn::answer(const RpcRequest& request, double now) {
   return response;
 }
 
-void SportStandIn::obey_arms(const LowCommandFrame& frame) {
+void FakeSport::obey_arms(const LowCommandFrame& frame) {
   if (frame.crc != checksum_of(frame) || frame.mode_pr != kPitchRollMode) {
     ++refused_;
     return;
@@ -138,12 +138,12 @@ void SportStandIn::obey_arms(const LowCommandFrame& frame) {
   }
 }
 
-VelocityCommand SportStandIn::velocity(double now) const {
+VelocityCommand FakeSport::velocity(double now) const {
   const bool lasts = fsm_walks(fsm_) && now - ordered_at_ < order_.duration;
   return lasts ? order_.velocity : VelocityCommand{};
 }
 
-void SportStandIn::write_command(std::uint8_t mode_machine, LowCommandFrame& frame) {
+void FakeSport::write_command(std::uint8_t mode_machine, LowCommandFrame& frame) {
   if (fsm_ == kFsmDamp) return build_damping(kDampingGain, mode_machine, frame);
   joints_ = stance_;
   for (int j = kFirstArmOfTopic; j < kG1Motors; ++j) {

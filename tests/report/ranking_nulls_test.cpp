@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "duet/core/numbers.h"
-#include "duet/report/ranking/board.h"
+#include "duet/report/ranking/ranking.h"
 #include "duet/statistics/clustered.h"
 #include "tests/rows/rows.h"
 
@@ -63,8 +63,8 @@ TEST(BoardVerdict, CallsAnEqualAheadInOneOfTwentyExperimentsAtMost) {
   int ahead = 0, many = 0, significant = 0;
   for (int i = 0; i < count; ++i) {
     const NullExperiment experiment = drawn_experiment(random);
-    const Board made = board(rows_of(experiment, random), {});
-    for (const std::string& sentence : board_verdict(made)) {
+    const Ranking made = rank_policies(rows_of(experiment, random), {});
+    for (const std::string& sentence : ranking_verdict(made)) {
       const bool says = sentence.find("is ahead of") != std::string::npos;
       ahead += says ? 1 : 0;
       EXPECT_TRUE(!says || experiment.clips >= kFewestClips) << sentence;

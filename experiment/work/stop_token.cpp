@@ -1,4 +1,4 @@
-#include "duet/experiment/work/stop_sign.h"
+#include "duet/experiment/work/stop_token.h"
 
 #include <atomic>
 #include <csignal>
@@ -11,7 +11,7 @@ constexpr double kGlance = 0.05;  // [s] between two looks at the sign
 
 }  // namespace
 
-RunEnd StopSign::end() const {
+RunEnd StopToken::end() const {
   switch (interrupt()) {
     case Interrupt::kInterrupted:
       return RunEnd::kInterrupted;
@@ -25,10 +25,10 @@ RunEnd StopSign::end() const {
   return limit_ > 0.0 && elapsed > limit_ ? RunEnd::kTimeLimit : RunEnd::kComplete;
 }
 
-StopWatch::StopWatch(const StopSign& sign, double grace, std::function<void(RunEnd)> act)
+Watchdog::Watchdog(const StopToken& sign, double grace, std::function<void(RunEnd)> act)
     : sign_(sign), act_(std::move(act)), thread_([this, grace] { watch(grace); }) {}
 
-StopWatch::~StopWatch() {
+Watchdog::~Watchdog() {
   {
     const std::lock_guard lock(mutex_);
     over_ = true;
@@ -37,12 +37,12 @@ StopWatch::~StopWatch() {
   thread_.join();
 }
 
-bool StopWatch::released_after(double seconds) {
+bool Watchdog::released_after(double seconds) {
   std::unique_lock lock(mutex_);
   return released_.wait_for(lock, std::chrono::duration<double>(seconds), [this] { return over_; });
 }
 
-void StopWatch::watch(double grace) {
+void Watchdog::watch(double grace) {
   while (!sign_.asked())
     if (released_after(kGlance)) return;
   if (!released_after(grace)) act_(sign_.end());

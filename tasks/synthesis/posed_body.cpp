@@ -1,4 +1,4 @@
-#include "duet/tasks/synthesis/figure.h"
+#include "duet/tasks/synthesis/posed_body.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,7 +15,7 @@ constexpr double kArmSaturation =
     0.995;                          // extension that no target exceeds: 11 degrees from shoulder-elbow to elbow-hand
 constexpr double kTightest = 0.36;  // least distance of the ends, in shares of the limb: 138 degrees of flexion
 
-void place(const Body& body, int joint, Figure& figure) {
+void place(const Body& body, int joint, PosedBody& figure) {
   const int parent = kSmplParents[joint];
   figure.p.col(joint) = figure.p.col(parent) + figure.R[parent] * body.offset[joint];
 }
@@ -74,7 +74,7 @@ Matrix3d rot_x(double angle) { return Eigen::AngleAxisd(angle, Vector3d::UnitX()
 Matrix3d rot_y(double angle) { return Eigen::AngleAxisd(angle, Vector3d::UnitY()).toRotationMatrix(); }
 Matrix3d rot_z(double angle) { return Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix(); }
 
-void pose_torso(const Body& body, const TorsoPose& torso, Figure& figure) {
+void pose_torso(const Body& body, const TorsoPose& torso, PosedBody& figure) {
   figure.yaw = torso.yaw;
   figure.p.col(kPelvis) = torso.pelvis;
   figure.R[kPelvis] = rot_z(torso.yaw + torso.pelvis_yaw) * rot_y(torso.pelvis_pitch) * rot_x(torso.pelvis_roll);
@@ -102,7 +102,7 @@ Vector3d ankle_of(const Body& body, const FootPose& foot, int side) {
   return foot.toe - rot_z(foot.yaw) * rot_y(foot.pitch) * body.offset[sided(kLeftToe, side)];
 }
 
-void pose_leg(const Body& body, const FootPose& foot, int side, Figure& figure) {
+void pose_leg(const Body& body, const FootPose& foot, int side, PosedBody& figure) {
   const int hip = sided(kLeftHip, side), knee = sided(kLeftKnee, side), ankle = sided(kLeftAnkle, side),
             toe = sided(kLeftToe, side);
   const Vector3d from = figure.p.col(hip);
@@ -118,7 +118,7 @@ void pose_leg(const Body& body, const FootPose& foot, int side, Figure& figure) 
   for (const int joint : {knee, ankle, toe}) place(body, joint, figure);
 }
 
-void pose_arm(const Body& body, const ArmPose& arm, int side, Figure& figure) {
+void pose_arm(const Body& body, const ArmPose& arm, int side, PosedBody& figure) {
   const int shoulder = sided(kLeftShoulder, side), elbow = sided(kLeftElbow, side), wrist = sided(kLeftWrist, side),
             hand = sided(kLeftHand, side);
   // Forearm and bent hand act as one rigid link from elbow to hand joint.
@@ -245,7 +245,7 @@ std::array<Eigen::Vector3d, 2> nearest_points(const SolidPart& one, const SolidP
 
 }  // namespace
 
-std::vector<SolidPart> solid_parts(const Body& body, const Figure& figure) {
+std::vector<SolidPart> solid_parts(const Body& body, const PosedBody& figure) {
   const double size = spine_of(body) / kReferenceSpine;
   std::vector<SolidPart> parts;
   parts.reserve(kColumns.size());
@@ -256,7 +256,7 @@ std::vector<SolidPart> solid_parts(const Body& body, const Figure& figure) {
   return parts;
 }
 
-SolidPart solid_hand(const Body& body, const Figure& figure, int side) {
+SolidPart solid_hand(const Body& body, const PosedBody& figure, int side) {
   const Eigen::Vector3d wrist = figure.p.col(sided(kLeftWrist, side));
   const Eigen::Vector3d bone = figure.p.col(sided(kLeftHand, side)) - wrist;
   return {wrist + kHandBegin * bone, wrist + kHandEnd * bone, kHandRadius * body.hand / kReferenceHand};
@@ -271,7 +271,7 @@ Overlap overlap_of(const SolidPart& part, const SolidPart& other) {
 }
 
 void pose_arm_outside(const Body& body, const ArmPose& arm, int side, const std::vector<SolidPart>& partner,
-                      Figure& figure) {
+                      PosedBody& figure) {
   constexpr int kMost = 24;
   ArmPose pose = arm;
   pose_arm(body, pose, side, figure);

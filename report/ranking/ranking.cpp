@@ -1,4 +1,4 @@
-#include "duet/report/ranking/board.h"
+#include "duet/report/ranking/ranking.h"
 
 #include <fmt/format.h>
 
@@ -16,23 +16,23 @@ namespace {
 
 constexpr double kLevel = 1e-9;  // rates of equal counts differ by rounding alone
 
-struct BoardKey {
+struct RankingKey {
   std::string arm, controller, policy, perturbation;
-  auto operator<=>(const BoardKey&) const = default;
+  auto operator<=>(const RankingKey&) const = default;
 };
 using EpisodeEngines = std::map<EpisodeId, std::map<std::string, const EpisodeRow*>>;
 
-BoardKey key_of(const BoardRow& row) { return {row.arm, row.controller, row.policy, row.perturbation}; }
+RankingKey key_of(const RankingRow& row) { return {row.arm, row.controller, row.policy, row.perturbation}; }
 
 // Rows of physics engines, or of playback where there is nothing else.
-std::map<BoardKey, EpisodeEngines> board_groups(const std::vector<EpisodeRow>& rows) {
+std::map<RankingKey, EpisodeEngines> board_groups(const std::vector<EpisodeRow>& rows) {
   const std::vector<const EpisodeRow*> distinct = distinct_episodes(rows);
   const auto is_physics = [](const EpisodeRow* row) { return row->engine != kPlaybackEngine; };
   const auto is_clean = [](const EpisodeRow* row) { return row->perturbation == kClean; };
   const bool physics = std::ranges::any_of(distinct, is_physics);
   const bool clean =
       std::ranges::any_of(distinct, [&](const EpisodeRow* row) { return is_physics(row) == physics && is_clean(row); });
-  std::map<BoardKey, EpisodeEngines> groups;
+  std::map<RankingKey, EpisodeEngines> groups;
   for (const EpisodeRow* row : distinct) {
     if (is_physics(row) != physics || is_clean(row) != clean) continue;
     const EpisodeRow*& place =
@@ -43,7 +43,7 @@ std::map<BoardKey, EpisodeEngines> board_groups(const std::vector<EpisodeRow>& r
   return groups;
 }
 
-void count_ends(const EpisodeEngines& episodes, BoardRow& row) {
+void count_ends(const EpisodeEngines& episodes, RankingRow& row) {
   for (const auto& [id, engines] : episodes) {
     for (const auto& [engine, of] : engines) {
       row.fell += of->fell || of->outcome == Outcome::kFell ? 1 : 0;
@@ -53,7 +53,7 @@ void count_ends(const EpisodeEngines& episodes, BoardRow& row) {
 }
 
 // Adds rates over the episodes that all engines of the group ran; n is 0 where there are none.
-void add_rates(const EpisodeEngines& episodes, double level, BoardRow& row) {
+void add_rates(const EpisodeEngines& episodes, double level, RankingRow& row) {
   std::set<std::string> names;
   for (const auto& [id, engines] : episodes)
     for (const auto& [engine, of] : engines) names.insert(engine);
@@ -95,13 +95,13 @@ double null_rate(const EpisodeEngines& episodes, const EpisodeEngines* null) {
 }
 
 // The null policy; of several the first by name.
-const EpisodeEngines* null_group(const std::map<BoardKey, EpisodeEngines>& groups, const BoardKey& of) {
+const EpisodeEngines* null_group(const std::map<RankingKey, EpisodeEngines>& groups, const RankingKey& of) {
   for (const auto& [key, episodes] : groups)
     if (key.arm == "null" && key.controller == of.controller && key.perturbation == of.perturbation) return &episodes;
   return nullptr;
 }
 
-void add_contact(const Estimates& contacts, BoardRow& row) {
+void add_contact(const Estimates& contacts, RankingRow& row) {
   const auto of_any = [&](const char* name) {
     return find_estimate(
         contacts,
@@ -109,14 +109,14 @@ void add_contact(const Estimates& contacts, BoardRow& row) {
   };
   const Estimate* touched = of_any("touched");
   if (row.arm != "main" || touched == nullptr) return;
-  row.contact = BoardContact{.episodes = *touched->n,
-                             .touched = std::lround(touched->value),
-                             .over = std::lround(of_any("over")->value),
-                             .worst_ratio = of_any("ratio")->value};
+  row.contact = RankingContact{.episodes = *touched->n,
+                               .touched = std::lround(touched->value),
+                               .over = std::lround(of_any("over")->value),
+                               .worst_ratio = of_any("ratio")->value};
 }
 
-BoardDifference difference_of(const std::map<BoardKey, EpisodeEngines>& groups, const BoardRow& a, const BoardRow& b,
-                              double level) {
+RankingDifference difference_of(const std::map<RankingKey, EpisodeEngines>& groups, const RankingRow& a,
+                                const RankingRow& b, double level) {
   const EpisodeEngines &of_a = groups.at(key_of(a)), &of_b = groups.at(key_of(b));
   EpisodePairs pairs;
   for (const auto& [id, engines] : of_a) {
@@ -125,7 +125,7 @@ BoardDifference difference_of(const std::map<BoardKey, EpisodeEngines>& groups, 
     for (const auto& [engine, row] : engines)
       if (const auto found = same->second.find(engine); found != same->second.end()) pairs.add(*row, *found->second);
   }
-  BoardDifference result{.other = b.name(), .interval = kNoInterval};
+  RankingDifference result{.other = b.name(), .interval = kNoInterval};
   if (pairs.clips() == 0) return result;
   result.difference = pairs.table().difference();
   result.interval = pairs.by_clip(level);
@@ -134,9 +134,9 @@ BoardDifference difference_of(const std::map<BoardKey, EpisodeEngines>& groups, 
   return result;
 }
 
-BoardSpread spread_of(const BoardRow& row, const EpisodeEngines& episodes) {
+RankingSpread spread_of(const RankingRow& row, const EpisodeEngines& episodes) {
   const auto [low, high] = std::ranges::minmax_element(row.rates, {}, &EngineRate::rate);
-  BoardSpread spread{.lowest = *low, .highest = *high};
+  RankingSpread spread{.lowest = *low, .highest = *high};
   EpisodePairs pairs;
   for (const auto& [id, engines] : episodes)
     if (engines.size() == row.rates.size()) pairs.add(*engines.at(high->engine), *engines.at(low->engine));
@@ -145,10 +145,10 @@ BoardSpread spread_of(const BoardRow& row, const EpisodeEngines& episodes) {
   return spread;
 }
 
-std::vector<std::string> engines_won_by_another(const std::vector<BoardRow>& rows) {
+std::vector<std::string> engines_won_by_another(const std::vector<RankingRow>& rows) {
   std::vector<std::string> engines;
   for (const EngineRate& first : rows.front().rates) {
-    const bool another = std::ranges::any_of(rows, [&](const BoardRow& row) {
+    const bool another = std::ranges::any_of(rows, [&](const RankingRow& row) {
       return std::ranges::any_of(row.rates, [&](const EngineRate& rate) {
         return rate.engine == first.engine && rate.rate > first.rate + kLevel;
       });
@@ -158,11 +158,11 @@ std::vector<std::string> engines_won_by_another(const std::vector<BoardRow>& row
   return engines;
 }
 
-bool is_better(const BoardRow& a, const BoardRow& b) {
+bool is_better(const RankingRow& a, const RankingRow& b) {
   return std::abs(a.mean - b.mean) > kLevel ? a.mean > b.mean : a.name() < b.name();
 }
 
-void rank(std::vector<BoardRow>& rows) {
+void rank(std::vector<RankingRow>& rows) {
   std::ranges::stable_sort(rows, is_better);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const bool level = i > 0 && std::abs(rows[i].mean - rows[i - 1].mean) <= kLevel;
@@ -171,37 +171,39 @@ void rank(std::vector<BoardRow>& rows) {
 }
 
 // Where no policy competes, the controllers do, under what knows the motion.
-void part_by_role(std::vector<BoardRow> all, Board& board) {
-  const auto is = [](ArmRole role) { return [role](const BoardRow& row) { return row.role.role == role; }; };
+void part_by_role(std::vector<RankingRow> all, Ranking& board) {
+  const auto is = [](ArmRole role) { return [role](const RankingRow& row) { return row.role.role == role; }; };
   board.of_oracles = std::ranges::none_of(all, is(ArmRole::kCompetitor));
   const ArmRole ranked = board.of_oracles ? ArmRole::kOracle : ArmRole::kCompetitor;
-  for (BoardRow& row : all) (row.role.role == ranked ? board.rows : board.references).push_back(std::move(row));
+  for (RankingRow& row : all) (row.role.role == ranked ? board.rows : board.references).push_back(std::move(row));
   rank(board.rows);
-  std::ranges::stable_sort(board.references, [](const BoardRow& a, const BoardRow& b) {
+  std::ranges::stable_sort(board.references, [](const RankingRow& a, const RankingRow& b) {
     return a.role.role != b.role.role ? a.role.role > b.role.role : is_better(a, b);
   });
 }
 
 }  // namespace
 
-std::string BoardRow::name() const {
+std::string RankingRow::name() const {
   std::string text = fmt::format("{} with {}", controller, policy);
   if (perturbation != kClean) text += " under " + perturbation;
   return role.word.empty() ? text : fmt::format("{} ({})", text, role.word);
 }
 
-Told told(const BoardDifference& difference, double level) {
+Told told(const RankingDifference& difference, double level) {
   if (difference.clips < kFewestClips) return Told::kTooFewClips;
   const bool test = difference.p <= 1.0 - level, interval = difference.interval.low > 0.0;
   if (difference.difference <= 0.0 || (!test && !interval)) return Told::kApart;
   return test && interval ? Told::kAhead : test ? Told::kTestAlone : Told::kIntervalAlone;
 }
 
-Board board(const std::vector<EpisodeRow>& rows, const Estimates& contacts, const BoardSuite& suite, double level) {
-  const std::map<BoardKey, EpisodeEngines> groups = board_groups(rows);
-  std::vector<BoardRow> all;
+Ranking rank_policies(const std::vector<EpisodeRow>& rows, const Estimates& contacts, const RankingSuite& suite,
+                      double level) {
+  const std::map<RankingKey, EpisodeEngines> groups = board_groups(rows);
+  std::vector<RankingRow> all;
   for (const auto& [key, episodes] : groups) {
-    BoardRow row{.controller = key.controller, .policy = key.policy, .perturbation = key.perturbation, .arm = key.arm};
+    RankingRow row{
+        .controller = key.controller, .policy = key.policy, .perturbation = key.perturbation, .arm = key.arm};
     row.role = role_of(key.arm, key.policy, suite.roles);
     add_rates(episodes, level, row);
     if (row.n == 0) continue;
@@ -210,15 +212,15 @@ Board board(const std::vector<EpisodeRow>& rows, const Estimates& contacts, cons
     add_contact(contacts, row);
     all.push_back(std::move(row));
   }
-  Board made{.suite = suite, .level = level};
+  Ranking made{.suite = suite, .level = level};
   part_by_role(std::move(all), made);
   if (made.rows.empty()) return made;
-  const BoardRow& first = made.rows.front();
+  const RankingRow& first = made.rows.front();
   if (made.rows.size() > 1) {
     made.lead = difference_of(groups, first, made.rows[1], level);
     made.won_by_another = engines_won_by_another(made.rows);
   }
-  const auto control = std::ranges::find_if(made.references, [&](const BoardRow& row) {
+  const auto control = std::ranges::find_if(made.references, [&](const RankingRow& row) {
     return row.role.role == ArmRole::kControl && row.controller == first.controller &&
            row.perturbation == first.perturbation;
   });

@@ -1,4 +1,4 @@
-#include "duet/execution/story.h"
+#include "duet/execution/report_content.h"
 
 #include <fmt/format.h>
 
@@ -146,11 +146,11 @@ PolicyRoles roles_of(const RunInfo& info) {
   return roles;
 }
 
-BoardSuite board_suite(const RunInfo& info) {
+RankingSuite board_suite(const RunInfo& info) {
   const std::string name = fmt::format("{} {}", info.suite, info.suite_version);
   const std::string note = shipped_suite_note(info);
-  BoardSuite suite{.label = note.empty() ? suite_label(info) : fmt::format("{}, {}", name, note),
-                   .roles = roles_of(info)};
+  RankingSuite suite{.label = note.empty() ? suite_label(info) : fmt::format("{}, {}", name, note),
+                     .roles = roles_of(info)};
   if (note.starts_with("NOT")) suite.warning = fmt::format("{} is {}.", name, note);
   return suite;
 }

@@ -7,21 +7,21 @@
 #include <functional>
 
 #include "duet/core/require.h"
-#include "duet/report/ranking/board.h"
 #include "duet/report/ranking/policy_groups.h"
+#include "duet/report/ranking/ranking.h"
 #include "duet/report/tables/text_table.h"
 #include "duet/statistics/clustered.h"
 
 namespace duet {
 namespace {
 
-std::string kind_of(const Board& board) {
+std::string kind_of(const Ranking& board) {
   const auto count = static_cast<long>(board.rows.size());
   return board.of_oracles ? counted(count, "arm") + " that know the motion" : counted(count, "competitor");
 }
 
 // "94.8 [91.3, 96.9] % success (mujoco, 252 episodes)"
-std::string success_text(const BoardRow& row) {
+std::string success_text(const RankingRow& row) {
   const std::string episodes = counted(row.n, "episode");
   const std::string where = row.rates.size() > 1
                                 ? fmt::format("mean over {} engines, {} each", row.rates.size(), episodes)
@@ -30,18 +30,18 @@ std::string success_text(const BoardRow& row) {
 }
 
 // "+3.6 [-0.7, 8.1] points over 126 clips (exact paired test by clip: p = 0.190)"
-std::string difference_text(const BoardDifference& of) {
+std::string difference_text(const RankingDifference& of) {
   return fmt::format("{} points over {} (exact paired test by clip: {})", points(of.difference, of.interval),
                      counted(of.clips, "clip"), p_text(of.p));
 }
 
-std::string too_few(const BoardDifference& of) {
+std::string too_few(const RankingDifference& of) {
   return fmt::format("{} {} too few clips to tell ({} are asked for)", of.clips, of.clips == 1 ? "is" : "are",
                      kFewestClips);
 }
 
 // The reason why a difference is no lead, as the end of a sentence.
-std::string why_no_lead(const BoardDifference& of, double level) {
+std::string why_no_lead(const RankingDifference& of, double level) {
   const Told word = told(of, level);
   if (word == Told::kTestAlone)
     return "; the exact test alone would, but the interval, which is as wide as so many clips make it, holds 0, and "
@@ -53,11 +53,11 @@ std::string why_no_lead(const BoardDifference& of, double level) {
   return "";
 }
 
-std::string first_sentence(const Board& board) {
-  const BoardRow& first = board.rows.front();
+std::string first_sentence(const Ranking& board) {
+  const RankingRow& first = board.rows.front();
   const std::string success = success_text(first);
   if (!board.lead) return fmt::format("{}: {}.", first.name(), success);
-  const BoardDifference& lead = *board.lead;
+  const RankingDifference& lead = *board.lead;
   if (lead.clips == 0)
     return fmt::format("{} has {}, the most of {}; it shares no episode with {}, and nothing tells the two apart.",
                        first.name(), success, kind_of(board), lead.other);
@@ -76,8 +76,8 @@ std::string first_sentence(const Board& board) {
                      kind_of(board), success, lead.other);
 }
 
-std::string lead_sentence(const Board& board) {
-  const BoardDifference& lead = *board.lead;
+std::string lead_sentence(const Ranking& board) {
+  const RankingDifference& lead = *board.lead;
   switch (told(lead, board.level)) {
     case Told::kAhead:
       return fmt::format("It is ahead of {} by {}.", lead.other, difference_text(lead));
@@ -92,10 +92,10 @@ std::string lead_sentence(const Board& board) {
                      difference_text(lead), why_no_lead(lead, board.level));
 }
 
-std::string lift_sentence(const Board& board) {
+std::string lift_sentence(const Ranking& board) {
   if (!board.lift || board.lift->clips == 0)
     return "No control was run beside it: success alone does not show that the robot took part.";
-  const BoardDifference& lift = *board.lift;
+  const RankingDifference& lift = *board.lift;
   switch (told(lift, board.level)) {
     case Told::kAhead:
       return fmt::format("Its lift over the best control, {}, is {}.", lift.other, difference_text(lift));
@@ -112,15 +112,15 @@ std::string lift_sentence(const Board& board) {
 }
 
 // The sentence about the best arm that knows the motion, with the first row's controller.
-std::string oracle_sentence(const Board& board) {
-  for (const BoardRow& row : board.references)
+std::string oracle_sentence(const Ranking& board) {
+  for (const RankingRow& row : board.references)
     if (row.role.role == ArmRole::kOracle && row.controller == board.rows.front().controller)
       return fmt::format("For reference, {}: {} %.", row.name(), percent(row.mean, row.interval));
   return "";
 }
 
-std::string engines_sentence(const Board& board) {
-  const BoardSpread& spread = *board.spread;
+std::string engines_sentence(const Ranking& board) {
+  const RankingSpread& spread = *board.spread;
   const std::size_t engines = board.rows.front().rates.size();
   std::string text;
   if (spread.highest.rate == spread.lowest.rate)
@@ -135,40 +135,40 @@ std::string engines_sentence(const Board& board) {
   return text + ".";
 }
 
-std::string rank_cell(const BoardRow& row) { return row.rank == 0 ? "-" : std::to_string(row.rank); }
+std::string rank_cell(const RankingRow& row) { return row.rank == 0 ? "-" : std::to_string(row.rank); }
 
-std::string policy_cell(const BoardRow& row) {
+std::string policy_cell(const RankingRow& row) {
   std::string text = row.perturbation == kClean ? row.policy : fmt::format("{}, {}", row.policy, row.perturbation);
   return row.role.word.empty() ? text : fmt::format("{} ({})", text, row.role.word);
 }
 
-std::string contact_text(const BoardRow& row) {
+std::string contact_text(const RankingRow& row) {
   if (!row.contact) return "-";
   return fmt::format(
       "{} of {}{}", row.contact->over, row.contact->touched,
       std::isfinite(row.contact->worst_ratio) ? fmt::format(" ({:.2f}x)", row.contact->worst_ratio) : "");
 }
 
-std::string rates_text(const BoardRow& row) {
+std::string rates_text(const RankingRow& row) {
   std::string text;
   for (const EngineRate& rate : row.rates)
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", rate.engine, percent(rate.rate));
   return text;
 }
 
-std::vector<const BoardRow*> all_rows(const Board& board) {
-  std::vector<const BoardRow*> rows;
-  for (const std::vector<BoardRow>* of : {&board.rows, &board.references})
-    for (const BoardRow& row : *of) rows.push_back(&row);
+std::vector<const RankingRow*> all_rows(const Ranking& board) {
+  std::vector<const RankingRow*> rows;
+  for (const std::vector<RankingRow>* of : {&board.rows, &board.references})
+    for (const RankingRow& row : *of) rows.push_back(&row);
   return rows;
 }
 
-TitledTable ranked_table(const Board& board) {
+TitledTable ranked_table(const Ranking& board) {
   TitledTable titled;
   titled.table.header = {"#",    "Controller", "Policy",     "Success [%]", "Null",
                          "Fell", "Unfinished", "Over limit", "By engine"};
   titled.table.label_columns = 3;
-  for (const BoardRow* row : all_rows(board))
+  for (const RankingRow* row : all_rows(board))
     titled.table.rows.push_back({rank_cell(*row), row->controller, policy_cell(*row), percent(row->mean, row->interval),
                                  percent(row->null_rate), std::to_string(row->fell), std::to_string(row->unfinished),
                                  contact_text(*row), rates_text(*row)});
@@ -181,7 +181,8 @@ TitledTable ranked_table(const Board& board) {
   return titled;
 }
 
-void add_difference_figures(const char* name, const BoardDifference& of, const Board& board, const EstimatesOf& row) {
+void add_difference_figures(const char* name, const RankingDifference& of, const Ranking& board,
+                            const EstimatesOf& row) {
   EstimatesOf figures = row;
   figures.keys.of = of.other;
   figures.add(name, of.clips, of.difference, of.interval);
@@ -196,10 +197,10 @@ constexpr const char* word_of(ArmRole role) {
   return role == ArmRole::kOracle ? "oracle" : role == ArmRole::kControl ? "control" : "competitor";
 }
 
-void add_board_figures(const Board& board, std::vector<Estimate>& into) {
+void add_board_figures(const Ranking& board, std::vector<Estimate>& into) {
   if (!board.suite.label.empty()) EstimatesOf{{}, into}.word("suite", board.suite.label);
-  for (const std::string& sentence : board_verdict(board)) EstimatesOf{{}, into}.word("verdict", sentence);
-  for (const BoardRow* row : all_rows(board)) {
+  for (const std::string& sentence : ranking_verdict(board)) EstimatesOf{{}, into}.word("verdict", sentence);
+  for (const RankingRow* row : all_rows(board)) {
     const EstimatesOf figures{{.engine = row->rates.size() > 1 ? "all" : row->rates.front().engine,
                                .controller = row->controller,
                                .policy = row->policy,
@@ -235,28 +236,28 @@ struct ScreenColumn {
   const char* title;
   std::size_t width;  // at most
   bool left;
-  std::string (*cell)(const BoardRow& row);
+  std::string (*cell)(const RankingRow& row);
 };
 constexpr ScreenColumn kScreenTable[] = {
     {"#", 3, false, rank_cell},
     {"policy", 34, true, policy_cell},
-    {"controller", 14, true, [](const BoardRow& row) { return row.controller; }},
-    {"success [%]", 19, false, [](const BoardRow& row) { return percent(row.mean, row.interval); }},
-    {"fell", 6, false, [](const BoardRow& row) { return std::to_string(row.fell); }},
-    {"unfinished", 10, false, [](const BoardRow& row) { return std::to_string(row.unfinished); }}};
+    {"controller", 14, true, [](const RankingRow& row) { return row.controller; }},
+    {"success [%]", 19, false, [](const RankingRow& row) { return percent(row.mean, row.interval); }},
+    {"fell", 6, false, [](const RankingRow& row) { return std::to_string(row.fell); }},
+    {"unfinished", 10, false, [](const RankingRow& row) { return std::to_string(row.unfinished); }}};
 
 std::string screen_line(const std::function<std::string(const ScreenColumn&)>& cell) {
   std::string line;
   for (const ScreenColumn& column : kScreenTable)
     line += fmt::format(fmt::runtime(column.left ? "{}{:<{}}" : "{}{:>{}}"), line.empty() ? "" : "  ",
-                        shown(cell(column), column.width), column.width);
+                        excerpt(cell(column), column.width), column.width);
   line.erase(line.find_last_not_of(' ') + 1);
   return line + "\n";
 }
 
 // Which rows fit: the best ones, and of the references as many as there is room for.
-std::string screen_table(const Board& board, std::size_t lines) {
-  const std::vector<const BoardRow*> rows = all_rows(board);
+std::string screen_table(const Ranking& board, std::size_t lines) {
+  const std::vector<const RankingRow*> rows = all_rows(board);
   std::size_t fits = rows.size(), ranked = board.rows.size(), others = board.references.size();
   if (rows.size() + 1 > lines) {
     fits = lines - 2;  // a line of titles, one that says what is left out
@@ -275,7 +276,7 @@ std::string screen_table(const Board& board, std::size_t lines) {
 
 }  // namespace
 
-std::vector<std::string> board_verdict(const Board& board) {
+std::vector<std::string> ranking_verdict(const Ranking& board) {
   std::vector<std::string> sentences;
   if (!board.rows.empty()) {
     sentences = {first_sentence(board)};
@@ -290,17 +291,17 @@ std::vector<std::string> board_verdict(const Board& board) {
   return sentences;
 }
 
-Analysis board_analysis(const Board& board) {
-  Analysis analysis{.name = kBoardName, .title = "Board", .level = board.level};
+Analysis ranking_analysis(const Ranking& board) {
+  Analysis analysis{.name = kRankingName, .title = "Board", .level = board.level};
   if (!board.suite.label.empty()) analysis.title += ": " + board.suite.label;
-  analysis.notes = board_verdict(board);
+  analysis.notes = ranking_verdict(board);
   if (analysis.notes.empty()) return analysis;
   analysis.tables = {ranked_table(board)};
   add_board_figures(board, analysis.estimates);
   return analysis;
 }
 
-std::string board_screen(const Board& board, const std::vector<std::string>& notes) {
+std::string ranking_screen(const Ranking& board, const std::vector<std::string>& notes) {
   constexpr std::size_t kFewestTableLines = 5, kMostNoteLines = 4;
   std::vector<std::string> lines, verdict;
   for (const std::string& note : notes)
@@ -309,7 +310,7 @@ std::string board_screen(const Board& board, const std::vector<std::string>& not
     lines.resize(kMostNoteLines);
     lines.back() = "... (--tables has all notes)";
   }
-  for (const std::string& sentence : board_verdict(board))
+  for (const std::string& sentence : ranking_verdict(board))
     for (std::string& line : wrapped(escape_markdown(sentence), kScreenColumns)) verdict.push_back(std::move(line));
   const std::size_t room = kScreenLines - 1 - kFewestTableLines - lines.size();
   if (verdict.size() > room) {

@@ -1,4 +1,4 @@
-#include "duet/execution/led_episodes.h"
+#include "duet/execution/stepped_episodes.h"
 
 #include <gmock/gmock.h>
 #include <sys/wait.h>
@@ -16,9 +16,9 @@ namespace {
 using test::thrown_message;
 using ::testing::HasSubstr;
 
-std::shared_ptr<const Experiment> led(const LedPart& part = {}) {
+std::shared_ptr<const Experiment> led(const SteppedPart& part = {}) {
   Progress quiet(Progress::Style::kQuiet);
-  return led_experiment(test::playback_suite(), part, 1, quiet);
+  return stepped_experiment(test::playback_suite(), part, 1, quiet);
 }
 
 // The null arm's answer to a question.
@@ -32,10 +32,10 @@ std::vector<double> holding(const PlanRequest& request, const RobotModel& robot)
   return numbers;
 }
 
-TEST(LedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
+TEST(SteppedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
   const std::shared_ptr<const Experiment> suite = led();
   ASSERT_EQ(suite->size(), 2);
-  LedEpisode episode(suite);
+  SteppedEpisode episode(suite);
   int questions = 0;
   for (auto request = episode.begin(1); request != nullptr; ++questions) {
     EXPECT_EQ(request->tick, questions * kTicksPerPlan);
@@ -51,9 +51,9 @@ TEST(LedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
   EXPECT_EQ(episode.row()->seed, expected.seed);
 }
 
-TEST(LedEpisode, AForkedChildThatGoesOnIsToldAndDoesNotWait) {
+TEST(SteppedEpisode, AForkedChildThatGoesOnIsToldAndDoesNotWait) {
   const std::shared_ptr<const Experiment> suite = led();
-  auto episode = std::make_unique<LedEpisode>(suite);
+  auto episode = std::make_unique<SteppedEpisode>(suite);
   const auto request = episode->begin(0);
   const std::vector<double> plan = holding(*request, *suite->bodies().nominal());
   const pid_t child = ::fork();
@@ -74,7 +74,7 @@ TEST(LedEpisode, AForkedChildThatGoesOnIsToldAndDoesNotWait) {
 TEST(LedExperiment, SaysHowManyQuestionsAnEpisodeAsksAtMost) {
   const std::shared_ptr<const Experiment> suite = led();
   for (int number = 0; number < suite->size(); ++number) {
-    LedEpisode episode(suite);
+    SteppedEpisode episode(suite);
     int questions = 0;
     for (auto request = episode.begin(number); request != nullptr; ++questions)
       request = episode.go_on(holding(*request, *suite->bodies().nominal()), kAnchors);
@@ -87,9 +87,9 @@ Eigen::MatrixXd partner_in(const PlanRequest& request) {
   return request.frames.col(kHistoryFrames - 1).segment(3, 3 * kSmplJoints).reshaped(3, kSmplJoints);
 }
 
-TEST(LedEpisode, APartnerWhoIsLedGoesWhereTheyAreLed) {
+TEST(SteppedEpisode, APartnerWhoIsLedGoesWhereTheyAreLed) {
   const std::shared_ptr<const Experiment> suite = led();
-  LedEpisode episode(suite, Led::kBoth);
+  SteppedEpisode episode(suite, DrivenBodies::kBoth);
   const auto first = episode.begin(0);
   ASSERT_NE(first, nullptr);
   PointTracks ahead = episode.partner_ahead();
@@ -105,11 +105,11 @@ TEST(LedEpisode, APartnerWhoIsLedGoesWhereTheyAreLed) {
   EXPECT_LT((partner_in(*third) - partner_in(*first)).cwiseAbs().maxCoeff(), 0.5);
 }
 
-TEST(LedEpisode, APartnerWhoIsNotLedOtherwiseFollowsTheClip) {
+TEST(SteppedEpisode, APartnerWhoIsNotLedOtherwiseFollowsTheClip) {
   const std::shared_ptr<const Experiment> suite = led();
   std::vector<Eigen::MatrixXd> alone, both;
   for (auto* seen : {&alone, &both}) {
-    LedEpisode episode(suite, seen == &both ? Led::kBoth : Led::kRobot);
+    SteppedEpisode episode(suite, seen == &both ? DrivenBodies::kBoth : DrivenBodies::kRobot);
     for (auto request = episode.begin(1); request != nullptr;) {
       seen->push_back(request->frames);
       if (seen == &both) episode.lead_partner(episode.partner_ahead());
@@ -120,12 +120,12 @@ TEST(LedEpisode, APartnerWhoIsNotLedOtherwiseFollowsTheClip) {
   EXPECT_EQ(alone, both);
 }
 
-TEST(LedEpisode, RefusesToLeadAPartnerWhereItCannot) {
-  LedEpisode alone(led());
+TEST(SteppedEpisode, RefusesToLeadAPartnerWhereItCannot) {
+  SteppedEpisode alone(led());
   ASSERT_NE(alone.begin(0), nullptr);
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { alone.lead_partner({}); }),
             "partner: expected an episode under way in which both are led");
-  LedEpisode both(led(), Led::kBoth);
+  SteppedEpisode both(led(), DrivenBodies::kBoth);
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { static_cast<void>(both.partner_ahead()); }),
             "partner: expected an episode under way in which both are led");
   ASSERT_NE(both.begin(0), nullptr);
@@ -137,9 +137,9 @@ TEST(LedEpisode, RefusesToLeadAPartnerWhereItCannot) {
             "partner: expected finite numbers");
 }
 
-TEST(LedEpisode, BeginsAnotherInTheMiddleOfOne) {
+TEST(SteppedEpisode, BeginsAnotherInTheMiddleOfOne) {
   const std::shared_ptr<const Experiment> suite = led();
-  LedEpisode episode(suite);
+  SteppedEpisode episode(suite);
   const auto first = episode.begin(0);
   ASSERT_NE(first, nullptr);
   ASSERT_NE(episode.go_on(holding(*first, *suite->bodies().nominal()), kAnchors), nullptr);
@@ -152,8 +152,8 @@ TEST(LedEpisode, BeginsAnotherInTheMiddleOfOne) {
   EXPECT_FALSE(episode.row().has_value());
 }
 
-TEST(LedEpisode, RefusesWhatItCannotLead) {
-  LedEpisode episode(led());
+TEST(SteppedEpisode, RefusesWhatItCannotLead) {
+  SteppedEpisode episode(led());
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.next(); }), "the episode has not begun: begin one");
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.begin(2); }),
             "episode: expected a number from 0 to 1, found 2");

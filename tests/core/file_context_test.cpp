@@ -8,7 +8,7 @@ using test::thrown_message;
 
 template <typename Error>
 std::string told(const std::string& message) {
-  return thrown_message<InputError>([&] { naming_file("a.npz", [&] { throw Error(message); }); });
+  return thrown_message<InputError>([&] { with_file_context("a.npz", [&] { throw Error(message); }); });
 }
 
 TEST(NamingFile, PutsTheFileBeforeWhatDoesNotNameIt) {
@@ -18,16 +18,16 @@ TEST(NamingFile, PutsTheFileBeforeWhatDoesNotNameIt) {
 }
 
 TEST(NamingFile, SaysThatThereIsNotEnoughMemoryForAFile) {
-  EXPECT_EQ(thrown_message<InputError>([] { naming_file("a.npz", [] { throw std::bad_alloc(); }); }),
+  EXPECT_EQ(thrown_message<InputError>([] { with_file_context("a.npz", [] { throw std::bad_alloc(); }); }),
             "a.npz: there is not enough memory for it");
 }
 
 TEST(NamingFile, LetsValuesAndOtherExceptionsThrough) {
   int value = 3;
-  EXPECT_EQ(&naming_file("a.npz", [&]() -> int& { return value; }), &value);
-  EXPECT_EQ(thrown_message<MissingError>([] { naming_file("a.npz", [] { throw MissingError("no engine"); }); }),
+  EXPECT_EQ(&with_file_context("a.npz", [&]() -> int& { return value; }), &value);
+  EXPECT_EQ(thrown_message<MissingError>([] { with_file_context("a.npz", [] { throw MissingError("no engine"); }); }),
             "no engine");
-  EXPECT_EQ(thrown_message<StorageError>([] { naming_file("a.npz", [] { throw StorageError("disk full"); }); }),
+  EXPECT_EQ(thrown_message<StorageError>([] { with_file_context("a.npz", [] { throw StorageError("disk full"); }); }),
             "disk full");
 }
 

@@ -28,7 +28,7 @@ void require_one_suite(const std::vector<Run>& runs) {
 }
 
 void require_one_digest(const std::vector<Run>& runs) {
-  NameDigests digests;
+  IdentityCheck digests;
   for (const Run& run : runs) {
     digests.add(run.info, run.path);
     for (const EpisodeRow& row : run.rows) digests.add(row, run.path);
@@ -60,7 +60,7 @@ nlohmann::json environments_of(const std::vector<Run>& runs) {
 }
 
 // A part of all policies was of those that the run's own suite has.
-RunPart of_own_policies(RunPart part, const RunInfo& info) {
+EpisodeFilter of_own_policies(EpisodeFilter part, const RunInfo& info) {
   if (part.policies.empty())
     for (const auto& [name, digest] : info.policies)
       if (name != "null") part.policies.push_back(name);
@@ -79,10 +79,10 @@ std::optional<RunPlan> plan_of(const std::vector<Run>& runs, const std::vector<s
     const RunPlan& own = *run.info.plan;
     missing = std::max(missing, own.asked - rows_of_each[i]);
     not_asked = std::max(not_asked, own.episodes - own.asked);
-    for (const RunPart& part : own.parts)
+    for (const EpisodeFilter& part : own.parts)
       plan.parts = with_part(std::move(plan.parts), of_own_policies(part, run.info));
   }
-  std::ranges::sort(plan.parts, {}, [](const RunPart& part) {
+  std::ranges::sort(plan.parts, {}, [](const EpisodeFilter& part) {
     return std::tie(part.engines, part.controllers, part.policies, part.tasks, part.perturbations);
   });
   plan.asked = rows + missing;
@@ -118,7 +118,7 @@ struct Origin {
   std::string run;
 };
 
-void add_row(const EpisodeRow& row, const std::string& run, std::map<std::string, Origin>& rows, RunUnion& result) {
+void add_row(const EpisodeRow& row, const std::string& run, std::map<std::string, Origin>& rows, MergedRuns& result) {
   const auto [found, is_new] = rows.try_emplace(row.key, Origin{row, run});
   if (is_new) return;
   Origin& first = found->second;
@@ -156,11 +156,11 @@ Run united_alone(Run run) {
 
 }  // namespace
 
-RunUnion unite(const std::vector<Run>& runs) {
+MergedRuns merge_loaded(const std::vector<Run>& runs) {
   require(!runs.empty(), "expected a run at least, found none");
   require_one_suite(runs);
   require_one_digest(runs);
-  RunUnion result;
+  MergedRuns result;
   result.run.path = runs.front().path;
   result.run.info = info_of(runs);
   std::map<std::string, Origin> rows;
@@ -192,7 +192,7 @@ RunInfo united_info(const std::vector<Run>& runs, const std::vector<std::int64_t
 Run united(std::vector<Run> runs) {
   require(!runs.empty(), "expected a run at least, found none");
   if (runs.size() == 1) return united_alone(std::move(runs.front()));
-  RunUnion result = unite(runs);
+  MergedRuns result = merge_loaded(runs);
   if (!result.conflicts.empty())
     throw InputError(fmt::format("{} ({} such {})", result.conflicts.front(), result.conflicts.size(),
                                  result.conflicts.size() == 1 ? "episode" : "episodes"));

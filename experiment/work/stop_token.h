@@ -13,13 +13,13 @@ namespace duet {
 
 enum class RunEnd { kComplete, kTimeLimit, kInterrupted, kTerminated };
 
-class StopSign {
+class StopToken {
  public:
   using Clock = std::chrono::steady_clock;
 
   // `limit` [s] counts from `begin`; 0 is none. `stop_asked`, where there is one, stops as an interrupt does; it is
   // called from any thread.
-  explicit StopSign(double limit = 0.0, Clock::time_point begin = Clock::now(), std::function<bool()> stop_asked = {})
+  explicit StopToken(double limit = 0.0, Clock::time_point begin = Clock::now(), std::function<bool()> stop_asked = {})
       : limit_(limit), begin_(begin), stop_asked_(std::move(stop_asked)) {}
   // kComplete: go on.
   [[nodiscard]] RunEnd end() const;
@@ -36,18 +36,18 @@ struct Stopped {};
 
 // Calls `act` once where this object still lives `grace` seconds after the sign: for work that cannot be asked to stop
 // (a network that loads, a file that is hashed). On a thread of its own.
-class StopWatch {
+class Watchdog {
  public:
-  StopWatch(const StopSign& sign, double grace, std::function<void(RunEnd)> act);
-  ~StopWatch();
-  StopWatch(const StopWatch&) = delete;
-  StopWatch& operator=(const StopWatch&) = delete;
+  Watchdog(const StopToken& sign, double grace, std::function<void(RunEnd)> act);
+  ~Watchdog();
+  Watchdog(const Watchdog&) = delete;
+  Watchdog& operator=(const Watchdog&) = delete;
 
  private:
   bool released_after(double seconds);
   void watch(double grace);
 
-  const StopSign& sign_;
+  const StopToken& sign_;
   std::function<void(RunEnd)> act_;
   std::mutex mutex_;
   std::condition_variable released_;

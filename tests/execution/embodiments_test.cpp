@@ -1,4 +1,4 @@
-#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/embodiments.h"
 
 #include <gmock/gmock.h>
 
@@ -47,7 +47,7 @@ TEST(OnBody, JointsGoByNameOthersStayAtNeutral) {
   EXPECT_EQ(moved.root.size(), motion.root.size());
 }
 
-TEST(Bodies, APolicyThatTheCallerBringsIsMadeByItsNameAndNotByWhatItUses) {
+TEST(Embodiments, APolicyThatTheCallerBringsIsMadeByItsNameAndNotByWhatItUses) {
   Suite suite = test::playback_suite();
   suite.policies = {{.name = "a", .use = "null"}, {.name = "b", .use = "null"}};
   std::vector<std::string> made;
@@ -59,15 +59,15 @@ TEST(Bodies, APolicyThatTheCallerBringsIsMadeByItsNameAndNotByWhatItUses) {
       };
     };
   };
-  const Bodies bodies(suite, {}, {}, {{"a", loader("first")}, {"b", loader("second")}});
+  const Embodiments bodies(suite, {}, {}, {{"a", loader("first")}, {"b", loader("second")}});
   for (const char* name : {"b", "a", "null"}) static_cast<void>(bodies.policy("pd", name)->make());
   EXPECT_EQ(made, (std::vector<std::string>{"second", "first"}));
 }
 
-TEST(Bodies, ControllersOfOneBodyShareItAndItsClips) {
+TEST(Embodiments, ControllersOfOneBodyShareItAndItsClips) {
   Suite suite = test::playback_suite();
   suite.controllers = {SuiteController{"pd"}, SuiteController{"vmc"}};
-  Bodies bodies(suite);
+  Embodiments bodies(suite);
   EXPECT_EQ(bodies.robot("pd"), bodies.robot("vmc"));
   EXPECT_EQ(bodies.robot("pd"), bodies.nominal());
   bodies.take_clips({test::paired(Task::kWave, *bodies.nominal())});
@@ -128,10 +128,11 @@ TEST(OnOtherBody, OfStrangersIsRefused) {
       HasSubstr("policy 'mirror'"));
 }
 
-TEST(Bodies, PerturbationsAreCheckedOnEveryBody) {
+TEST(Embodiments, PerturbationsAreCheckedOnEveryBody) {
   Suite suite = test::playback_suite();
   suite.perturbations = {test::perturbation("{push: {link: nowhere}}")};
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { const Bodies bodies(suite); }), HasSubstr("nowhere"));
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { const Embodiments bodies(suite); }),
+              HasSubstr("nowhere"));
 }
 
 TEST(Plan, PerturbationsAreAnAxisOfEnginesAndNotOfPlayback) {

@@ -33,18 +33,18 @@ struct ControllerOnBody {
   std::string refusal = {};                 // why this machine cannot run it; empty where it can
 };
 
-class Bodies {
+class Embodiments {
  public:
   // Throws as load_robot for the suite's own card and for a card that is broken, as policy_maker where a policy does
   // not fit nominal() or its files are broken, and InputError for a file that was replaced since the suite was read.
   // InputError too for programs that are not allowed. A controller or policy whose files are not on this machine is
   // absent, not an error; those in `skipped` are not looked at. `called`: how policies are made that the caller brings,
   // by their names in the suite.
-  explicit Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers = {},
-                  const std::vector<std::string>& skipped_policies = {},
-                  const std::map<std::string, PolicyLoader>& called = {});
-  Bodies(const Bodies&) = delete;  // the specs of a plan point into it
-  Bodies& operator=(const Bodies&) = delete;
+  explicit Embodiments(const Suite& suite, const std::vector<std::string>& skipped_controllers = {},
+                       const std::vector<std::string>& skipped_policies = {},
+                       const std::map<std::string, PolicyLoader>& called = {});
+  Embodiments(const Embodiments&) = delete;  // the specs of a plan point into it
+  Embodiments& operator=(const Embodiments&) = delete;
 
   // Puts the clips, retargeted to nominal(), on every body. Once.
   void take_clips(std::vector<PairedMotion> clips);

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "duet/core/numbers.h"
-#include "duet/tasks/synthesis/figure.h"
+#include "duet/tasks/synthesis/posed_body.h"
 #include "tests/support.h"
 
 namespace duet::synthesis {
@@ -28,7 +28,7 @@ TorsoPose some_torso(Random& random, const Body& body) {
   return torso;
 }
 
-FootPose foot_below(const Figure& figure, const Body& body, int side, double pitch) {
+FootPose foot_below(const PosedBody& figure, const Body& body, int side, double pitch) {
   FootPose foot;
   foot.toe = figure.p.col(sided(kLeftHip, side)) + rot_z(figure.yaw) * Vector3d(0.1, 0.0, 0.0);
   foot.toe.z() = body.toe_height();
@@ -37,7 +37,7 @@ FootPose foot_below(const Figure& figure, const Body& body, int side, double pit
   return foot;
 }
 
-ArmPose arm_to(const Figure& figure, const Body& body, int side, double share, Random& random) {
+ArmPose arm_to(const PosedBody& figure, const Body& body, int side, double share, Random& random) {
   const Vector3d direction =
       rot_z(figure.yaw) * Vector3d(random.uniform(0.2, 1.0), random.uniform(-0.5, 0.5), random.uniform(-1.0, 0.8));
   ArmPose arm;
@@ -73,7 +73,7 @@ TEST(SynthesisFigure, JointsFollowFromRotationsAndBonesAreExact) {
   Random random(7, 1);
   for (int trial = 0; trial < 50; ++trial) {
     const Body body = body_of(random.uniform(1.5, 1.95));
-    Figure figure;
+    PosedBody figure;
     pose_torso(body, some_torso(random, body), figure);
     for (const int side : {0, 1}) {
       pose_leg(body, foot_below(figure, body, side, random.uniform(-0.1, 0.6)), side, figure);
@@ -94,7 +94,7 @@ TEST(SynthesisFigure, FeetAndHandsWithinReachAreWhereTheyWereSent) {
   Random random(7, 2);
   for (int trial = 0; trial < 50; ++trial) {
     const Body body = body_of(1.7);
-    Figure figure;
+    PosedBody figure;
     pose_torso(body, some_torso(random, body), figure);
     for (const int side : {0, 1}) {
       const FootPose foot = foot_below(figure, body, side, 0.2);
@@ -111,7 +111,7 @@ TEST(SynthesisFigure, ElbowsPointToThePoleKneesForward) {
   Random random(7, 3);
   const Body body = body_of(1.8);
   for (int trial = 0; trial < 50; ++trial) {
-    Figure figure;
+    PosedBody figure;
     pose_torso(body, some_torso(random, body), figure);
     for (const int side : {0, 1}) {
       pose_leg(body, foot_below(figure, body, side, 0.1), side, figure);
@@ -130,7 +130,7 @@ TEST(SynthesisFigure, WristBendsByTheAngleGivenInTheElbowsPlane) {
   Random random(7, 4);
   const Body body = body_of(1.7);
   for (const double wrist : {-0.5, 0.0, 0.3, 0.8}) {
-    Figure figure;
+    PosedBody figure;
     pose_torso(body, some_torso(random, body), figure);
     ArmPose arm = arm_to(figure, body, 1, 0.7, random);
     arm.wrist = wrist;
@@ -146,7 +146,7 @@ TEST(SynthesisFigure, WristBendsByTheAngleGivenInTheElbowsPlane) {
 
 TEST(SynthesisFigure, AnArmNeverLocksHoweverFarTheTarget) {
   const Body body = body_of(1.7);
-  Figure figure;
+  PosedBody figure;
   pose_torso(body, {}, figure);
   double last = 0.0;
   for (double share = 0.05; share < 3.0; share += 0.01) {
@@ -163,7 +163,7 @@ TEST(SynthesisFigure, AnArmNeverLocksHoweverFarTheTarget) {
 
 TEST(SynthesisFigure, BothSidesAreMirrorImages) {
   const Body body = body_of(1.7);
-  Figure figure;
+  PosedBody figure;
   pose_torso(body, {.pelvis = {0.0, 0.0, 0.9}, .pelvis_pitch = 0.2, .spine_bend = 0.3}, figure);
   for (const int side : {0, 1}) {
     const double sign = side_sign(side);

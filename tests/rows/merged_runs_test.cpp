@@ -50,39 +50,40 @@ void expect_same(const duet::Run& a, const duet::Run& b) {
   EXPECT_EQ(a.info.created_at, b.info.created_at);
 }
 
-TEST(RunUnion, TwoPeoplesPoliciesStandBesideOneNullArm) {
-  const RunUnion both = unite({run_of("a", "mine"), run_of("b", "yours")});
+TEST(MergedRuns, TwoPeoplesPoliciesStandBesideOneNullArm) {
+  const MergedRuns both = merge_loaded({run_of("a", "mine"), run_of("b", "yours")});
   EXPECT_THAT(both.conflicts, IsEmpty());
   EXPECT_EQ(both.folded, 3);
   EXPECT_THAT(both.run.rows, SizeIs(9));
   EXPECT_THAT(both.run.info.policies, SizeIs(3));
 }
 
-TEST(RunUnion, DoesNotDependOnTheOrderOfTheRuns) {
+TEST(MergedRuns, DoesNotDependOnTheOrderOfTheRuns) {
   const duet::Run a = run_of("a", "mine", "2026-01-02"), b = run_of("b", "yours", "2026-01-01");
-  expect_same(unite({a, b}).run, unite({b, a}).run);
+  expect_same(merge_loaded({a, b}).run, merge_loaded({b, a}).run);
 }
 
-TEST(RunUnion, DoesNotDependOnHowTheRunsAreGrouped) {
+TEST(MergedRuns, DoesNotDependOnHowTheRunsAreGrouped) {
   const duet::Run a = run_of("a", "mine", "2026-01-03"), b = run_of("b", "yours", "2026-01-01"),
                   c = run_of("c", "theirs", "2026-01-02");
-  const duet::Run left = unite({unite({a, b}).run, c}).run, right = unite({a, unite({b, c}).run}).run;
+  const duet::Run left = merge_loaded({merge_loaded({a, b}).run, c}).run,
+                  right = merge_loaded({a, merge_loaded({b, c}).run}).run;
   expect_same(left, right);
-  expect_same(left, unite({a, b, c}).run);
+  expect_same(left, merge_loaded({a, b, c}).run);
 }
 
-TEST(RunUnion, OfARunWithItselfIsThatRun) {
-  const duet::Run a = unite({run_of("a", "mine")}).run;
-  const RunUnion twice = unite({a, a});
+TEST(MergedRuns, OfARunWithItselfIsThatRun) {
+  const duet::Run a = merge_loaded({run_of("a", "mine")}).run;
+  const MergedRuns twice = merge_loaded({a, a});
   EXPECT_EQ(twice.folded, 6);
   expect_same(twice.run, a);
 }
 
-TEST(RunUnion, UnequalRowsOfOneEpisodeAreNamedWithTheFieldsAndBothRuns) {
+TEST(MergedRuns, UnequalRowsOfOneEpisodeAreNamedWithTheFieldsAndBothRuns) {
   duet::Run other = run_of("b", "yours");
   other.rows[1].state_hash = "another";  // of the null arm
   other.rows[1].success = true;
-  const RunUnion both = unite({run_of("a", "mine"), other});
+  const MergedRuns both = merge_loaded({run_of("a", "mine"), other});
   EXPECT_THAT(both.conflicts,
               ElementsAre("hug-0 0 of mujoco/vmc/null clean is not the same in 'a' and 'b': state_hash: \"\", "
                           "\"another\"; success: false, true"));
@@ -92,7 +93,7 @@ TEST(RunUnion, UnequalRowsOfOneEpisodeAreNamedWithTheFieldsAndBothRuns) {
               HasSubstr("state_hash: \"\", \"another\"; success: false, true (1 such episode)"));
 }
 
-TEST(RunUnion, ATimeOutGivesWayInEitherOrder) {
+TEST(MergedRuns, ATimeOutGivesWayInEitherOrder) {
   duet::Run late = run_of("b", "mine");
   late.rows[0].outcome = late.rows[1].outcome = Outcome::kTimedOut;
   late.rows[0].success = false;
@@ -101,54 +102,54 @@ TEST(RunUnion, ATimeOutGivesWayInEitherOrder) {
   for (const std::vector<duet::Run>& runs :
        {std::vector{run_of("a", "mine"), late}, std::vector{late, run_of("a", "mine")},
         std::vector{later, late, run_of("a", "mine")}}) {
-    const RunUnion both = unite(runs);
+    const MergedRuns both = merge_loaded(runs);
     EXPECT_THAT(both.conflicts, IsEmpty());
     EXPECT_THAT(both.run.rows, testing::Each(testing::Field(&EpisodeRow::outcome, Outcome::kOk)));
     EXPECT_EQ(both.folded + both.superseded, 6 * (static_cast<int>(runs.size()) - 1));
   }
-  EXPECT_THAT(unite({late, late}).conflicts, IsEmpty());
+  EXPECT_THAT(merge_loaded({late, late}).conflicts, IsEmpty());
 }
 
-TEST(RunUnion, OneNameForTwoPoliciesIsRefusedWithBothDigests) {
+TEST(MergedRuns, OneNameForTwoPoliciesIsRefusedWithBothDigests) {
   duet::Run other = run_of("b", "mine");
   other.info.policies["mine"] = std::string(64, 'b');
   for (EpisodeRow& row : other.rows)
     if (row.policy == "mine") row.policy_digest = std::string(64, 'b');
   for (EpisodeRow& row : other.rows) row.key = episode_key(row);
   EXPECT_EQ(test::thrown_message<InputError>([&] {
-              unite({run_of("a", "mine"), other});
+              merge_loaded({run_of("a", "mine"), other});
             }),
             "policy 'mine' is aaaaaaaaaaaa in a and bbbbbbbbbbbb in b: one name stands for one policy");
 }
 
-TEST(RunUnion, RunsOfTwoSuitesAreRefused) {
+TEST(MergedRuns, RunsOfTwoSuitesAreRefused) {
   duet::Run other = run_of("b", "yours");
   other.info.suite_hash = "fedcba9876543210";
   EXPECT_THAT(test::thrown_message<InputError>([&] {
-                unite({run_of("a", "mine"), other});
+                merge_loaded({run_of("a", "mine"), other});
               }),
               AllOf(HasSubstr("'a' is a run of tiny 1.0.0 (01234567)"), HasSubstr("'b' of tiny 1.0.0 (fedcba98)"),
                     HasSubstr("are not mixed")));
 }
 
-TEST(RunUnion, APolicyThatOneOfTheRunsLacksTakesTheOthersDigest) {
+TEST(MergedRuns, APolicyThatOneOfTheRunsLacksTakesTheOthersDigest) {
   duet::Run other = run_of("b", "yours");
   other.info.policies["mine"] = "";  // its files were not there, and no row is of it
-  EXPECT_EQ(unite({other, run_of("a", "mine")}).run.info.policies.at("mine"), std::string(64, 'a'));
+  EXPECT_EQ(merge_loaded({other, run_of("a", "mine")}).run.info.policies.at("mine"), std::string(64, 'a'));
 }
 
-TEST(RunUnion, IsPartialWhereOneOfTheRunsIs) {
+TEST(MergedRuns, IsPartialWhereOneOfTheRunsIs) {
   duet::Run whole = run_of("a", "mine"), partial = run_of("b", "yours");
-  whole.info.plan = RunPlan{.episodes = 6, .asked = 6, .parts = {RunPart()}};
-  partial.info.plan = RunPlan{.episodes = 10, .asked = 10, .parts = {RunPart()}};
-  const duet::Run both = unite({whole, partial}).run;
+  whole.info.plan = RunPlan{.episodes = 6, .asked = 6, .parts = {EpisodeFilter()}};
+  partial.info.plan = RunPlan{.episodes = 10, .asked = 10, .parts = {EpisodeFilter()}};
+  const duet::Run both = merge_loaded({whole, partial}).run;
   EXPECT_TRUE(is_partial(both));
   EXPECT_EQ(both.info.plan->asked, 9 + 4);
-  EXPECT_FALSE(is_partial(unite({whole, whole}).run));
-  EXPECT_EQ(unite({partial, whole}).run.info.plan, both.info.plan);
+  EXPECT_FALSE(is_partial(merge_loaded({whole, whole}).run));
+  EXPECT_EQ(merge_loaded({partial, whole}).run.info.plan, both.info.plan);
   ASSERT_EQ(both.info.plan->parts.size(), 2U);
   EXPECT_EQ(both.info.plan->parts[0].policies, std::vector<std::string>{"mine"});
-  EXPECT_FALSE(unite({whole, run_of("b", "yours")}).run.info.plan.has_value());  // one does not say
+  EXPECT_FALSE(merge_loaded({whole, run_of("b", "yours")}).run.info.plan.has_value());  // one does not say
 }
 
 }  // namespace

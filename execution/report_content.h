@@ -23,7 +23,7 @@ ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const R
 // united with it, the digest of what made their rows.
 PolicyRoles roles_of(const RunInfo& info);
 // How its tables call the suite, with a warning where it only bears the name of one that ships.
-BoardSuite board_suite(const RunInfo& info);
+RankingSuite board_suite(const RunInfo& info);
 
 // The tables for the analyses of a run; the metrics are the catalogue's, and the 18 of retargeting those that drift.
 // The rows are the run's, which may be lean.

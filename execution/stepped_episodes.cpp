@@ -1,4 +1,4 @@
-#include "duet/execution/led_episodes.h"
+#include "duet/execution/stepped_episodes.h"
 
 #include <fmt/format.h>
 
@@ -34,7 +34,7 @@ std::string engine_of(const Suite& suite, const std::string& asked) {
 }
 
 // The suite of one policy, the caller, in one engine under one controller.
-Suite narrowed(Suite suite, const LedPart& part) {
+Suite narrowed(Suite suite, const SteppedPart& part) {
   suite.require_clips();
   if (!suite.references.empty())
     throw InputError(fmt::format("{}: expected a suite of clips, found one of walking commands", suite.file));
@@ -50,7 +50,7 @@ Suite narrowed(Suite suite, const LedPart& part) {
 
 }  // namespace
 
-std::shared_ptr<Experiment> led_experiment(Suite suite, const LedPart& part, int threads, Progress& progress) {
+std::shared_ptr<Experiment> stepped_experiment(Suite suite, const SteppedPart& part, int threads, Progress& progress) {
   suite = narrowed(std::move(suite), part);
   if (suite.engines.front() != kPlaybackEngine) static_cast<void>(engine_module(suite.engines.front()));
   auto experiment = std::make_shared<Experiment>(std::move(suite), ExperimentOptions{.led = {kCaller}});
@@ -65,7 +65,7 @@ int questions_of(const Experiment& experiment, std::int64_t episode) {
 }
 
 // In a forked child the thread is not there to be waited for, and its queue may be locked for ever: they are left.
-LedEpisode::~LedEpisode() {
+SteppedEpisode::~SteppedEpisode() {
   if (process_ == ::getpid()) {
     stop();
     return;
@@ -74,7 +74,7 @@ LedEpisode::~LedEpisode() {
   static_cast<void>(new (std::nothrow) std::shared_ptr<PlanQueue>(std::move(queue_)));
 }
 
-void LedEpisode::require_same_process() const {
+void SteppedEpisode::require_same_process() const {
   if (process_ == ::getpid()) return;
   throw std::runtime_error(
       fmt::format("the episode runs in process {}, and this is process {}, forked from it: expected episodes that this "
@@ -82,7 +82,7 @@ void LedEpisode::require_same_process() const {
                   process_, ::getpid()));
 }
 
-void LedEpisode::start(int episode) {
+void SteppedEpisode::start(int episode) {
   require_same_process();
   require(episode >= 0 && episode < experiment_->size(), "episode: expected a number from 0 to {}, found {}",
           experiment_->size() - 1, episode);
@@ -90,7 +90,7 @@ void LedEpisode::start(int episode) {
   stop_ = false;
   row_.reset();
   queue_ = PlanQueue::make({.name = kCaller, .patience = 0.0, .share = 1.0});
-  partner_ = led_ == Led::kBoth ? std::make_shared<PointTracks>() : nullptr;
+  partner_ = led_ == DrivenBodies::kBoth ? std::make_shared<PointTracks>() : nullptr;
   const EpisodeOverrides overrides{.policy = queue_->maker(experiment_->at(episode).body->robot),
                                    .stop_asked = [this] { return stop_.load(); },
                                    .partner = partner_};
@@ -106,7 +106,7 @@ void LedEpisode::start(int episode) {
   });
 }
 
-PointTracks LedEpisode::partner_ahead() const {
+PointTracks SteppedEpisode::partner_ahead() const {
   require(question_ != nullptr && partner_ != nullptr, "partner: expected an episode under way in which both are led");
   PointTracks ahead(kTicksPerPlan, kSmplJoints);
   for (int i = 0; i < kTicksPerPlan; ++i)
@@ -114,7 +114,7 @@ PointTracks LedEpisode::partner_ahead() const {
   return ahead;
 }
 
-void LedEpisode::lead_partner(const PointTracks& ahead) {
+void SteppedEpisode::lead_partner(const PointTracks& ahead) {
   require(question_ != nullptr && partner_ != nullptr, "partner: expected an episode under way in which both are led");
   require(ahead.frames() == kTicksPerPlan && ahead.points() == kSmplJoints,
           "partner: expected {} frames of {} joints, found {} of {}", kTicksPerPlan, kSmplJoints, ahead.frames(),
@@ -125,13 +125,13 @@ void LedEpisode::lead_partner(const PointTracks& ahead) {
     partner_->frame(question_->tick + 1 + i) = ahead.frame(i);
 }
 
-void LedEpisode::answer(std::span<const double> numbers, int rows) {
+void SteppedEpisode::answer(std::span<const double> numbers, int rows) {
   require_same_process();
   require(question_ != nullptr, "the episode is over: begin another one");
   queue_->answer(*question_, numbers, rows);
 }
 
-std::shared_ptr<const PlanRequest> LedEpisode::next() {
+std::shared_ptr<const PlanRequest> SteppedEpisode::next() {
   require_same_process();
   require(queue_ != nullptr, "the episode has not begun: begin one");
   question_.reset();
@@ -142,7 +142,7 @@ std::shared_ptr<const PlanRequest> LedEpisode::next() {
   return question_;
 }
 
-void LedEpisode::stop() {
+void SteppedEpisode::stop() {
   if (process_ != ::getpid()) return;  // nothing of it runs here
   stop_ = true;
   if (queue_) queue_->close("the episode was stopped");

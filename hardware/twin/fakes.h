@@ -24,7 +24,7 @@ struct HomieTraffic {
   double last_pedal = kNever;
 };
 
-class HomieStandIn {
+class FakeHomie {
  public:
   // A datagram of the group.
   void receive(std::span<const std::byte> datagram, double now);
@@ -47,10 +47,10 @@ class HomieStandIn {
 // A stand-in for the maker's walking service and its arm topic, for tests and for `duet-g1-services`: calls and their
 // answers, velocities that end, arms by weight. No gait: the legs keep the stance. Facts: docs/hardware.md,
 // "Executors". A pure function of what it is given. One owner, one thread.
-class SportStandIn {
+class FakeSport {
  public:
   // `stance`: of kG1Motors joints, what it holds itself.
-  explicit SportStandIn(JointCommand stance, int fsm = kFsmStart);
+  explicit FakeSport(JointCommand stance, int fsm = kFsmStart);
 
   RpcResponse answer(const RpcRequest& request, double now);
   // A frame of the arm topic; one with a wrong checksum is counted and not obeyed.
