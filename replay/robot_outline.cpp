@@ -92,7 +92,7 @@ std::vector<OutlineHull> hulls_of(const RobotModel& robot, const Kinematics& sta
 // The parts that are drawn of each link: its hull first, then the shapes outside of it.
 std::vector<std::vector<OutlinePart>> parts_of(const RobotModel& robot, const std::vector<OutlineHull>& hulls) {
   std::vector<std::vector<OutlinePart>> parts(robot.links.size());
-  std::vector<bool> join_without_links(robot.shapes.size(), false);
+  std::vector<bool> inside(robot.shapes.size(), false);
   for (const OutlineHull& hull : hulls) {
     parts[hull.link].push_back({hull.link, hull.spheres});
     for (const int shape : hull.shapes) inside[shape] = true;
