@@ -119,8 +119,14 @@ set(DUET_TEST_OPTIMISATION $<IF:$<BOOL:${DUET_SANITIZE}>,-O0,$<$<CONFIG:Release>
 function(duet_add_test room)
   cmake_parse_arguments(ARG "SERIAL" "SHARDS" "SOURCES;LINK;HEADERS" ${ARGN})
   find_package(GTest REQUIRED)
+  if(NOT TARGET duet_test_main)  # main(), and the golden files of sentences
+    add_library(duet_test_main STATIC ${DUET_SOURCES}/tests/sentences.cpp)
+    target_include_directories(duet_test_main PRIVATE ${DUET_SOURCES})
+    target_compile_definitions(duet_test_main PRIVATE DUET_SOURCE_DIR="${DUET_SOURCES}")
+    target_link_libraries(duet_test_main PRIVATE duet_flags duet::options PUBLIC GTest::gtest GTest::gmock)
+  endif()
   add_executable(${room}_test ${ARG_SOURCES})
-  target_link_libraries(${room}_test PRIVATE duet_flags duet::options ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_link_libraries(${room}_test PRIVATE duet_flags duet::options ${ARG_LINK} duet_test_main)
   target_include_directories(${room}_test PRIVATE ${DUET_SOURCES})  # "tests/<room>/..."
   target_compile_definitions(${room}_test PRIVATE DUET_SOURCE_DIR="${DUET_SOURCES}")
   target_compile_options(${room}_test PRIVATE ${DUET_TEST_OPTIMISATION})

@@ -50,4 +50,7 @@ done
 printf '  %-12s %8d %s\n' all "$now_all" "${commit:+$then_all}"
 core=0
 for room in $(sed -n '/^\[core\]/,/^\[[^c]/s/^\([a-z]*\):.*/\1/p' cmake/rooms.txt); do core=$((core + $(lines_now "$room"))); done
+tests=$(lines_now tests) then=
+[ -z "$commit" ] || then=$(lines_then "$commit" tests)
+printf '  %-12s %8d %s\n' tests "$tests" "$then"
 printf '  %-12s %8d (without the parts: rooms that they have, and parts/)\n' core "$core"

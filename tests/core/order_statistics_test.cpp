@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include <array>
 #include <cmath>
@@ -12,7 +11,6 @@ namespace duet {
 namespace {
 
 using test::thrown_message;
-using testing::HasSubstr;
 
 TEST(Quantile, IsLinearBetweenOrderStatistics) {
   EXPECT_DOUBLE_EQ(quantile({4.0, 1.0, 3.0, 2.0}, 0.25), 1.75);
@@ -20,7 +18,7 @@ TEST(Quantile, IsLinearBetweenOrderStatistics) {
   EXPECT_DOUBLE_EQ(quantile({4.0, 1.0, 3.0, 2.0}, 1.0), 4.0);
   EXPECT_DOUBLE_EQ(quantile({7.0}, 0.3), 7.0);
   EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { quantile({1.0}, 1.5); }), HasSubstr("found 1.5"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { quantile({1.0}, 1.5); }));
 }
 
 TEST(Quantile, OfSortedValuesReadsNothingBehindThem) {
@@ -59,8 +57,7 @@ TEST(Kendall, IsNotDefinedForOneItemOrTiesThroughout) {
   EXPECT_TRUE(std::isnan(kendall({}, {}).tau_b));
   EXPECT_TRUE(std::isnan(kendall(std::vector{1.0}, std::vector{1.0}).tau_b));
   EXPECT_TRUE(std::isnan(kendall(std::vector{1.0, 1.0}, std::vector{1.0, 2.0}).tau_b));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { kendall(std::vector{1.0}, {}); }),
-              HasSubstr("as many values in both, found 1 and 0"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { kendall(std::vector{1.0}, {}); }));
 }
 
 double weighted_median_of(const std::vector<double>& values, const std::vector<double>& weights) {
@@ -96,8 +93,8 @@ TEST(WeightedMedian, RefusesWrongWeights) {
   const auto message = [](const std::vector<double>& weights) {
     return thrown_message<std::invalid_argument>([&] { weighted_median_of({1.0, 2.0}, weights); });
   };
-  EXPECT_THAT(message({1.0}), HasSubstr("expected one weight per value, found 1 for 2"));
-  EXPECT_THAT(message({1.0, -1.0}), HasSubstr("expected weights of at least 0"));
+  EXPECT_SENTENCE(message({1.0}));
+  EXPECT_SENTENCE(message({1.0, -1.0}));
 }
 
 // Weeks of remission, Freireich et al. 1963, the example of most textbooks.
@@ -124,7 +121,7 @@ TEST(KaplanMeier, WithoutCensoringIsTheOrderStatistic) {
   EXPECT_EQ(kaplan_meier_quantile(lifetimes, 0.75), 3.0);
   EXPECT_TRUE(std::isnan(kaplan_meier_quantile({}, 0.5)));
   EXPECT_TRUE(std::isnan(kaplan_meier_quantile({{.time = 1.0}}, 0.5)));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { kaplan_meier_quantile({}, 0.0); }), HasSubstr("found 0"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { kaplan_meier_quantile({}, 0.0); }));
 }
 
 }  // namespace

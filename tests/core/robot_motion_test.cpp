@@ -38,20 +38,14 @@ TEST(RobotMotion, ReferenceIsAFrame) {
 
 TEST(RobotMotion, RefusesEachKindOfFault) {
   static constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(message_after([](RobotMotion& m) { m.rate_hz = 0.0; }), "walk.npz: expected a rate above 0 Hz, found 0");
-  EXPECT_EQ(message_after([](RobotMotion& m) { m.rate_hz = kNan; }), "walk.npz: expected a rate above 0 Hz, found nan");
-  EXPECT_EQ(message_after([](RobotMotion& m) { m.root.pop_back(); }),
-            "walk.npz: expected as many frames of joints as of the root (2), found 3");
-  EXPECT_EQ(message_after([](RobotMotion& m) { m.joint_names.pop_back(); }),
-            "walk.npz: expected 1 joints as named, found 2 rows of joint angles");
-  EXPECT_EQ(message_after([](RobotMotion& m) { m.root[1].p.z() = kNan; }),
-            "walk.npz: root position of frame 1 is not finite");
-  EXPECT_EQ(message_after([](RobotMotion& m) { m.root[2].R.coeffs() *= 2.0; }),
-            "walk.npz: root quaternion of frame 2: expected norm 1, found 2");
-  EXPECT_EQ(message_after([](RobotMotion& m) { m.root[2].R.x() = kNan; }),
-            "walk.npz: root quaternion of frame 2: expected norm 1, found nan");
-  EXPECT_EQ(message_after([](RobotMotion& m) { m.q(1, 2) = std::numeric_limits<double>::infinity(); }),
-            "walk.npz: angle of joint 'right_knee' in frame 2 is not finite");
+  EXPECT_SENTENCE(message_after([](RobotMotion& m) { m.rate_hz = 0.0; }));
+  EXPECT_SENTENCE(message_after([](RobotMotion& m) { m.rate_hz = kNan; }));
+  EXPECT_SENTENCE(message_after([](RobotMotion& m) { m.root.pop_back(); }));
+  EXPECT_SENTENCE(message_after([](RobotMotion& m) { m.joint_names.pop_back(); }));
+  EXPECT_SENTENCE(message_after([](RobotMotion& m) { m.root[1].p.z() = kNan; }));
+  EXPECT_SENTENCE(message_after([](RobotMotion& m) { m.root[2].R.coeffs() *= 2.0; }));
+  EXPECT_SENTENCE(message_after([](RobotMotion& m) { m.root[2].R.x() = kNan; }));
+  EXPECT_SENTENCE(message_after([](RobotMotion& m) { m.q(1, 2) = std::numeric_limits<double>::infinity(); }));
 }
 
 RobotMotion ramp(int frames, double rate_hz) {
@@ -89,10 +83,8 @@ TEST(RobotMotion, ResamplingToItsOwnRateChangesNothing) {
 }
 
 TEST(RobotMotion, ResamplingRefusesNonsense) {
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] { resample(ramp(3, 50.0), 0.0); }),
-            "resample: expected a rate above 0 Hz, found 0");
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] { resample(RobotMotion(), 50.0); }),
-            "resample: expected frames, found none");
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { resample(ramp(3, 50.0), 0.0); }));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { resample(RobotMotion(), 50.0); }));
 }
 
 }  // namespace

@@ -66,9 +66,7 @@ TEST(BuildTree, IsThatOfTheNearestCacheWhichNamesDuet) {
 }
 
 TEST(ShareFile, MissingFilesAreRefusedWithThePlaces) {
-  EXPECT_THAT(test::thrown_message<MissingError>([] { share_file("robot card", "robots/none.yaml"); }),
-              ::testing::AllOf(::testing::HasSubstr("no robot card: looked at"),
-                               ::testing::HasSubstr("share/duet/robots/none.yaml")));
+  EXPECT_SENTENCE(test::thrown_message<MissingError>([] { share_file("robot card", "robots/none.yaml"); }));
 }
 
 }  // namespace

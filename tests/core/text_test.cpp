@@ -22,7 +22,7 @@ TEST(Shown, EscapesWhatMovesOrRecoloursTheTerminal) {
 }
 
 TEST(Shown, EscapesBytesThatAreNotUtf8) {
-  for (const char* bad : {"\xff", "\xc3", "\x80"}) EXPECT_EQ(excerpt(bad).size(), 4u) << shown(bad);
+  for (const char* bad : {"\xff", "\xc3", "\x80"}) EXPECT_EQ(excerpt(bad).size(), 4u) << excerpt(bad);
   EXPECT_EQ(excerpt("\xc0\xaf"), "\\xc0\\xaf");
   EXPECT_EQ(excerpt("\xed\xa0\x80"), "\\xed\\xa0\\x80");
   EXPECT_EQ(excerpt("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");

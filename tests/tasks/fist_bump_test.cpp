@@ -1,7 +1,6 @@
 // The seventh task from end to end: what is drawn, what the detector says of it and of its neighbours, which policies
 // refuse it.
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 
 #include "duet/core/require.h"
 #include "duet/motion/synthesis/synthesis.h"
@@ -163,8 +162,7 @@ TEST(FistBumpDetector, LooksAtHandsAndRootsAlone) {
   EXPECT_EQ(detect(fist_bump(), s.partner, s.performer, DetectorVersion::kRobot).margins,
             detect(fist_bump(), s.performer, s.partner, DetectorVersion::kPaper).margins);
   s.partner.rhand.resize(3, 0);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { (void)judge(s); }),
-              ::testing::HasSubstr("partner.rhand is needed and empty"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { (void)judge(s); }));
 }
 
 // ---- beside its neighbours
@@ -206,9 +204,7 @@ TEST(FistBump, IsRefusedByNameByDstarUnlessAPromptSaysWhatToDo) {
   context.start = test::g1()->standing_state();
   for (const std::string_view prompt : {std::string_view(), task_prompt(fist_bump())}) {
     context.prompt = prompt;
-    EXPECT_EQ(test::thrown_message<MissingError>([&] { policy->reset(context); }),
-              "policy 'dstar' was not made for the task 'fist_bump': it knows hug, handshake, high_five, wave, bend, "
-              "fly_kiss");
+    EXPECT_SENTENCE(test::thrown_message<MissingError>([&] { policy->reset(context); }));
   }
   context.prompt = "give the person a high five";
   EXPECT_NO_THROW(policy->reset(context));
