@@ -24,6 +24,11 @@ std::string literally(const std::string& text) {
   return std::regex_replace(text, std::regex(R"([.\\+*?^$()\[\]{}|])"), R"(\$&)");
 }
 
+// The folder in which tests/<room>/<room>_test was built.
+std::string build_folder() {
+  return std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path().parent_path();
+}
+
 // What differs from machine to machine or from run to run: folders of tests, of the build and of the
 // sources, digests of programs and inputs (not those that a test makes up of one digit).
 std::string normalised(std::string text) {
@@ -31,7 +36,7 @@ std::string normalised(std::string text) {
   static const std::vector<std::pair<std::regex, std::string>> rules = {
       {std::regex(temporary + R"(/duet-test-\w{6})"), "<scratch>"},
       {std::regex(temporary + "/duet-"), "<temp>/duet-"},
-      {std::regex(literally(kSource) + R"(/build/\w+)"), "<build>"},
+      {std::regex(literally(build_folder())), "<build>"},
       {std::regex(literally(kSource)), "<source>"},
       {std::regex(R"(\b(?!([0-9a-f])\1{63})[0-9a-f]{64}\b)"), "<SHA-256>"},
       {std::regex(R"(\b(?!([0-9a-f])\1{11})[0-9a-f]{12}\b)"), "<digest>"}};

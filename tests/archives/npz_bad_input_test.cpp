@@ -1,5 +1,4 @@
 // A file that is no archive of plain arrays is refused with InputError: never a crash, never a guess.
-
 #include <algorithm>
 #include <cstring>
 

@@ -11,7 +11,6 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 using test::ScratchFolder;
-using ::testing::HasSubstr;
 
 constexpr std::string_view kPointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a2146\nsize 12345\n";
 

@@ -11,7 +11,6 @@ namespace {
 
 using test::thrown_message;
 using testing::ElementsAre;
-using testing::HasSubstr;
 
 // y = x + 1, h' = h + x[0]; its own memory counts the runs since the last reset.
 class CountingNetwork final : public Network {
@@ -72,25 +71,19 @@ TEST(BoundNetwork, RefusesInputsThatAreNotItsOwnWithTheLayout) {
       network.bind_input(name, 4, std::span(x).first(size), {{{{"gyro", 3}}, 1}});
     });
   };
-  EXPECT_EQ(bind("x", 3),
-            "mine.yaml:4: with net.onnx: input 'x': expected 2 numbers, found 3 of the channels: gyro 0..2");
-  EXPECT_THAT(bind("z", 2), HasSubstr("mine.yaml:4: with net.onnx: unknown input 'z'"));
-  EXPECT_THAT(bind("", 2), HasSubstr("expected the name of one of the network's inputs (x, h), found none"));
+  EXPECT_SENTENCE(bind("x", 3));
+  EXPECT_SENTENCE(bind("z", 2));
+  EXPECT_SENTENCE(bind("", 2));
   EXPECT_EQ(bind("x", 2), "(nothing was thrown)");
-  EXPECT_EQ(bind("x", 2), "mine.yaml:4: with net.onnx: expected each input once, found 'x' again");
-  EXPECT_EQ(thrown_message<InputError>([&] { network.require_all_bound(); }),
-            "mine.yaml: with net.onnx: expected every input of the network in 'inputs', found none for 'h'");
+  EXPECT_SENTENCE(bind("x", 2));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { network.require_all_bound(); }));
 }
 
 TEST(BoundNetwork, RefusesStatesThatDoNotFit) {
   BoundNetwork network = counting();
-  EXPECT_EQ(thrown_message<InputError>([&] { network.bind_state("h", 5, "y"); }),
-            "mine.yaml:5: with net.onnx: input 'h': expected 1 numbers, found 2 of the output 'y'");
-  EXPECT_THAT(thrown_message<InputError>([&] { network.bind_state("h", 5, "next"); }),
-              HasSubstr("mine.yaml:5: with net.onnx: unknown output 'next'"));
-  EXPECT_THAT(
-      thrown_message<InputError>([&] { (void)network.find_output("", 7); }),
-      HasSubstr("mine.yaml:7: with net.onnx: expected the name of one of the network's outputs (y, next_h, runs)"));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { network.bind_state("h", 5, "y"); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { network.bind_state("h", 5, "next"); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)network.find_output("", 7); }));
 }
 
 }  // namespace

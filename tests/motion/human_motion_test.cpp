@@ -1,7 +1,5 @@
 #include "duet/motion/human_motion.h"
 
-#include <gmock/gmock.h>
-
 #include <functional>
 #include <limits>
 #include <numbers>
@@ -15,7 +13,6 @@ namespace {
 using test::moving_person;
 using test::reference_posture;
 using test::thrown_message;
-using ::testing::HasSubstr;
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kAlgebra = 64 * kEpsilon;  // a few operations on numbers of the size of 1
@@ -40,8 +37,7 @@ TEST(HumanMotion, HeadingOfAPersonOnTheSideIsRefused) {
   const Eigen::Quaterniond on_the_side(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()));
   for (int j = 0; j < kSmplJoints; ++j) motion.joints.at(1, j) = on_the_side * Eigen::Vector3d(motion.joints.at(1, j));
   const std::string message = thrown_message<std::invalid_argument>([&] { (void)heading(motion.joints, 1); });
-  EXPECT_THAT(message, HasSubstr("heading at frame 1"));
-  EXPECT_THAT(message, HasSubstr("no horizontal part"));
+  EXPECT_SENTENCE(message);
 }
 
 TEST(HumanMotion, ResamplingToTheSameRateChangesNoBit) {
@@ -116,9 +112,8 @@ TEST(HumanMotion, AnInstantIsAFramesToABillionthOfAPeriod) {
 TEST(HumanMotion, ResampleRefusesRatesThatAreNoRates) {
   const HumanMotion motion = moving_person(3, 50.0, Eigen::Vector3d::Zero());
   for (const double rate_hz : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()})
-    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { (void)resample(motion, rate_hz); }),
-                HasSubstr("expected a positive rate"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { (void)resample(motion, 1e12); }), HasSubstr("more than"));
+    EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { (void)resample(motion, rate_hz); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { (void)resample(motion, 1e12); }));
 }
 
 TEST(HumanMotion, SliceKeepsPositionsAndRotationsTogether) {
@@ -132,37 +127,25 @@ TEST(HumanMotion, SliceKeepsPositionsAndRotationsTogether) {
   EXPECT_THROW((void)slice(motion, 0, 11), std::invalid_argument);
 }
 
-struct BadMotion {
-  std::string expected;
-  std::function<void(HumanMotion&)> spoil;
-};
-
 TEST(HumanMotion, ValidationNamesPlaceAndFault) {
-  const std::vector<BadMotion> cases = {
-      {"expected a positive rate, found 0 Hz", [](HumanMotion& m) { m.rate_hz = 0.0; }},
-      {"expected 24 joints, found 22", [](HumanMotion& m) { m.joints = PointTracks(4, 22); }},
-      {"expected at least 2 frames, found 1", [](HumanMotion& m) { m = slice(m, 0, 1); }},
-      {"frame 2, joint 'left_knee': the position is not finite",
-       [](HumanMotion& m) { m.joints.at(2, kLeftKnee).y() = std::nan(""); }},
-      {"frame 1, joint 'head': the position is not finite",
-       [](HumanMotion& m) { m.joints.at(1, kHead).x() = std::numeric_limits<double>::infinity(); }},
-      {"frame 0, joint 'neck': the bone to 'spine3' is 0 m long",
-       [](HumanMotion& m) { m.joints.at(0, kNeck) = m.joints.at(0, kSpine3); }},
-      {"expected 96 rotations (frames x joints) or none, found 95", [](HumanMotion& m) { m.rotations.pop_back(); }},
-      {"frame 3, joint 'right_hand': expected a unit quaternion, found length 1.1",
-       [](HumanMotion& m) {
-         m.rotations[3 * kSmplJoints + kRightHand] = {1.1, 0.0, 0.0, 0.0};
-       }},
-      {"frame 0, joint 'pelvis': expected a unit quaternion, found length nan",
-       [](HumanMotion& m) { m.rotations[0].x() = std::nan(""); }},
-  };
+  const std::vector<std::function<void(HumanMotion&)>> spoils = {
+      [](HumanMotion& m) { m.rate_hz = 0.0; },
+      [](HumanMotion& m) { m.joints = PointTracks(4, 22); },
+      [](HumanMotion& m) { m = slice(m, 0, 1); },
+      [](HumanMotion& m) { m.joints.at(2, kLeftKnee).y() = std::nan(""); },
+      [](HumanMotion& m) { m.joints.at(1, kHead).x() = std::numeric_limits<double>::infinity(); },
+      [](HumanMotion& m) { m.joints.at(0, kNeck) = m.joints.at(0, kSpine3); },
+      [](HumanMotion& m) { m.rotations.pop_back(); },
+      [](HumanMotion& m) {
+        m.rotations[3 * kSmplJoints + kRightHand] = {1.1, 0.0, 0.0, 0.0};
+      },
+      [](HumanMotion& m) { m.rotations[0].x() = std::nan(""); }};
   HumanMotion good = moving_person(4, 50.0, Eigen::Vector3d::Zero());
   EXPECT_NO_THROW(validate(good, "person A"));
-  for (const BadMotion& bad : cases) {
+  for (const auto& spoil : spoils) {
     HumanMotion motion = good;
-    bad.spoil(motion);
-    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { validate(motion, "person A"); }),
-                HasSubstr("person A: " + bad.expected));
+    spoil(motion);
+    EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { validate(motion, "person A"); }));
   }
 }
 

@@ -1,7 +1,5 @@
 #include "duet/motion/paired_motion.h"
 
-#include <gmock/gmock.h>
-
 #include <cmath>
 
 #include "duet/core/require.h"
@@ -16,7 +14,6 @@ using test::edited;
 using test::thrown_message;
 using test::with_number;
 using test::without_key;
-using ::testing::HasSubstr;
 
 constexpr int kFrames = 6;
 
@@ -89,46 +86,33 @@ TEST(PairedMotion, ArraysHaveTheDocumentedShapes) {
 TEST(PairedMotion, SavingRefusesPartsThatDisagree) {
   PairedMotion motion = example();
   motion.partner = slice(motion.partner, 0, 5);
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { (void)paired_motion_bytes(motion); }),
-              HasSubstr("partner: expected the robot's 6 frames, found 5"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { (void)paired_motion_bytes(motion); }));
   motion = example();
   motion.source_reactor.rate_hz = 30.0;
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { (void)paired_motion_bytes(motion); }),
-              HasSubstr("source_reactor: expected the robot's rate of 50 Hz, found 30 Hz"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { (void)paired_motion_bytes(motion); }));
   motion = example();
   motion.reshaped = PointTracks(5, 16);
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { (void)paired_motion_bytes(motion); }),
-              HasSubstr("reshaped: expected the robot's 6 frames, found 5"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { (void)paired_motion_bytes(motion); }));
   motion = example();
   motion.phases.act_end = 7;
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { (void)paired_motion_bytes(motion); }),
-              HasSubstr("phases: expected 0 <= act_begin <= act_end <= 6 frames, found [2, 7)"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { (void)paired_motion_bytes(motion); }));
 }
 
 TEST(PairedMotion, ReadingNamesFileKeyAndFault) {
   const std::string good = paired_motion_bytes(example());
-  const auto expect_refused = [](const std::string& bytes, const std::string& expected) {
-    const std::string message = thrown_message<InputError>([&] { (void)parse_paired_motion(bytes, "bad.npz"); });
-    EXPECT_THAT(message, HasSubstr("bad.npz"));
-    EXPECT_THAT(message, HasSubstr(expected));
+  const auto expect_refused = [](const std::string& bytes) {
+    EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)parse_paired_motion(bytes, "bad.npz"); }));
   };
-  expect_refused(edited(good, [](Npz& npz) { npz.set_text("schema", "duet.interaction_clip"); }),
-                 "key 'schema': expected 'duet.paired_motion', found 'duet.interaction_clip'");
-  expect_refused(edited(good, [](Npz& npz) { npz.set_text("robot_jont_names", "x"); }),
-                 "did you mean 'robot_joint_names'?");
-  expect_refused(edited(good,
-                        [](Npz& npz) {
-                          npz.set("robot_joint_names", std::vector<std::string>{"a", "b"});
-                        }),
-                 "robot_q");
-  expect_refused(with_number(good, "robot_root_quat_wxyz", 0, 0.5), "root quaternion of frame 0");
-  expect_refused(with_number(good, "robot_q", 2, std::nan("")), "robot_q");
-  expect_refused(edited(good, [](Npz& npz) { npz.set("reshaped", PointTracks(5, 16)); }),
-                 "reshaped: expected the robot's 6 frames, found 5");
-  expect_refused(without_key(good, "settings_names"), "settings_names");
+  expect_refused(edited(good, [](Npz& npz) { npz.set_text("schema", "duet.interaction_clip"); }));
+  expect_refused(edited(good, [](Npz& npz) { npz.set_text("robot_jont_names", "x"); }));
+  expect_refused(edited(good, [](Npz& npz) { npz.set("robot_joint_names", std::vector<std::string>{"a", "b"}); }));
+  expect_refused(with_number(good, "robot_root_quat_wxyz", 0, 0.5));
+  expect_refused(with_number(good, "robot_q", 2, std::nan("")));
+  expect_refused(edited(good, [](Npz& npz) { npz.set("reshaped", PointTracks(5, 16)); }));
+  expect_refused(without_key(good, "settings_names"));
   for (const std::string key : {"clip_id", "robot_joint_names", "robot_root_position", "robot_root_quat_wxyz",
                                 "robot_q", "partner_joints", "source_partner_joints", "source_reactor_joints"})
-    expect_refused(without_key(good, key), "'" + key + "'");
+    expect_refused(without_key(good, key));
 }
 
 TEST(PairedMotion, TruncatedFilesAreRefused) {

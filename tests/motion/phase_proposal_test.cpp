@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <numbers>
@@ -14,7 +13,6 @@ namespace {
 
 using test::moving_person;
 using test::thrown_message;
-using ::testing::HasSubstr;
 
 constexpr double kRate = 50.0;
 
@@ -102,9 +100,8 @@ TEST(PhaseProposal, AlwaysHoldsAnActInsideTheMotion) {
 
 TEST(PhaseProposal, MotionsOfDifferentLengthAreRefused) {
   const Pair pair(10);
-  EXPECT_THAT(
-      thrown_message<std::invalid_argument>([&] { (void)propose_phases(pair.a, slice(pair.b, 0, 9), Task::kHug); }),
-      HasSubstr("expected two motions of the same length, found 10 and 9 frames"));
+  EXPECT_SENTENCE(
+      thrown_message<std::invalid_argument>([&] { (void)propose_phases(pair.a, slice(pair.b, 0, 9), Task::kHug); }));
 }
 
 // Synthetic clips know their phases. Agreement: frames in both acts over frames in either.

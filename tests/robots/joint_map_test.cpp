@@ -50,10 +50,9 @@ TEST(JointMap, AMotionOfTheSameJointsInAnotherOrderIsTheSameMotion) {
 }
 
 TEST(JointMap, RobotsWithoutAJointInCommonAreRefused) {
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] {
-              JointMap({"Waist", "Left_Hip_Pitch"}, test::g1());
-            }),
-            "expected a motion with joints of robot 'g1' ('left_hip_pitch_joint', ...), found one of 'Waist', ...");
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] {
+    JointMap({"Waist", "Left_Hip_Pitch"}, test::g1());
+  }));
   EXPECT_NO_THROW(JointMap({}, test::g1()));
 }
 

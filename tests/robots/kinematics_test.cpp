@@ -212,13 +212,9 @@ TEST(FrameTracks, RefuseAMotionOfAnotherRobot) {
   RobotMotion motion;
   motion.root.resize(2);
   motion.q = Eigen::MatrixXd::Zero(12, 2);
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([&] { frame_tracks(g1(), motion, {0}); }),
-            "frame tracks of 'g1': expected a motion of 29 joints and 2 frames, found 12 and 2");
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { frame_tracks(g1(), motion, {0}); }));
   motion.q = Eigen::MatrixXd::Zero(29, 2);
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([&] {
-              frame_tracks(g1(), motion, {0, 99});
-            }),
-            "frame tracks of 'g1': expected frame indices below 44, found 99");
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { frame_tracks(g1(), motion, {0, 99}); }));
 }
 
 }  // namespace

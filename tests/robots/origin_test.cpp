@@ -76,8 +76,7 @@ TEST(Origin, WithoutAPelvisIsBetweenTheHipsAndWithoutLegsRefusedBelowTheSoles) {
   EXPECT_LT(std::abs(load_robot(moved.card).standing_height - height_of(t1(), "Hip_Pitch_Left")), 1e-9);
   const std::size_t legs = text.find("legs:\n");
   write_file(moved.card, text.substr(0, legs) + text.substr(text.find("waist:", legs)));
-  EXPECT_THAT(test::thrown_message<InputError>([&] { load_robot(moved.card); }),
-              HasSubstr("m below its soles: expected 'pairs' with the pelvis, or 'legs'"));
+  EXPECT_SENTENCE(test::thrown_message<InputError>([&] { load_robot(moved.card); }));
 }
 
 TEST(RobotNotes, SayThatDynamicsAreNotSimulated) {

@@ -18,15 +18,10 @@ TEST(RobotModel, FindsNamesAndRefusesOthers) {
   EXPECT_EQ(g1().frames[g1().frame_index("pelvis")].link, 0);
   EXPECT_EQ(g1().keypoints[g1().keypoint_index("right_hand")].name, "right_hand");
   EXPECT_EQ(g1().track_frame("head"), g1().frame_index("head_link"));
-  EXPECT_THAT(
-      thrown_message<std::invalid_argument>([] { static_cast<void>(g1().joint_index("left_kne_joint")); }),
-      testing::StartsWith("unknown joint 'left_kne_joint': did you mean 'left_knee_joint'? Nearest of 29: left_knee_"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().frame_index("pelvi")); }),
-              testing::StartsWith("unknown frame 'pelvi': did you mean 'pelvis'? Nearest of "));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().keypoint_index("left_wris")); }),
-              testing::StartsWith("unknown keypoint 'left_wris': did you mean 'left_wrist'?"));
-  EXPECT_EQ(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().track_frame("trso")); }),
-            "unknown track 'trso': did you mean 'torso'? Known: head, lhand, lshoulder, rhand, rshoulder, torso");
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().joint_index("left_kne_joint")); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().frame_index("pelvi")); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().keypoint_index("left_wris")); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().track_frame("trso")); }));
 }
 
 TEST(RobotModel, VectorsFollowTheJoints) {
@@ -56,9 +51,8 @@ TEST(RobotModel, DefaultCommandCarriesTheCardsGains) {
     EXPECT_EQ(command.kd[j], g1().joints[j].kd);
   }
   EXPECT_EQ(command.tau_ff, Eigen::VectorXd::Zero(29));
-  EXPECT_EQ(
-      thrown_message<std::invalid_argument>([] { static_cast<void>(g1().default_command(Eigen::VectorXd::Zero(12))); }),
-      "default command of 'g1': expected 29 joint targets, found 12");
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>(
+      [] { static_cast<void>(g1().default_command(Eigen::VectorXd::Zero(12))); }));
 }
 
 TEST(RobotModel, FallsBelowItsCardsHeightOrBeyondItsTilt) {
@@ -75,8 +69,7 @@ TEST(RobotModel, FallsBelowItsCardsHeightOrBeyondItsTilt) {
 }
 
 TEST(RobotModel, WhatWasMadeForAnotherIsRefusedByName) {
-  EXPECT_EQ(thrown_message<InputError>([] { require_made_for("t1", g1(), "weights.safetensors"); }),
-            "weights.safetensors: made for 't1', the robot is 'g1'");
+  EXPECT_SENTENCE(thrown_message<InputError>([] { require_made_for("t1", g1(), "weights.safetensors"); }));
   EXPECT_NO_THROW(require_made_for("g1", g1(), ""));
 }
 

@@ -12,9 +12,6 @@ namespace {
 using test::kSmallCard;
 using test::kSmallUrdf;
 using test::replaced;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::StartsWith;
 
 std::string urdf_error(const std::string& urdf) {
   return test::thrown_message<InputError>([&] { parse_urdf(urdf, "x.urdf"); });
@@ -138,39 +135,26 @@ TEST(Urdf, GeometryMayBeAnything) {
 }
 
 TEST(UrdfErrors, NotXml) {
-  EXPECT_EQ(urdf_error(""), "x.urdf: expected a URDF, found an empty file");
-  EXPECT_EQ(urdf_error(" \n "), "x.urdf: expected a URDF, found an empty file");
-  EXPECT_EQ(urdf_error("joints: 3"), "x.urdf:1: expected well-formed XML, found: Error document empty.");
-  EXPECT_EQ(urdf_error("<sdf/>"), "x.urdf: expected the element <robot>, found none");
-  EXPECT_EQ(urdf_error(kSmallUrdf.substr(0, kSmallUrdf.size() / 2)),
-            "x.urdf:13: expected well-formed XML, found a tag without its '>'");
+  for (const char* text : {"", " \n ", "joints: 3", "<sdf/>"}) EXPECT_SENTENCE(urdf_error(text));
+  EXPECT_SENTENCE(urdf_error(kSmallUrdf.substr(0, kSmallUrdf.size() / 2)));
 }
 
 TEST(UrdfErrors, Tree) {
-  EXPECT_EQ(
-      urdf_error(replaced(kSmallUrdf, "</robot>", "<link name=\"loose\"/></robot>")),
-      "x.urdf: not a valid URDF: expected one root (a link that is no joint's child), found two: [base] and [loose]");
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "</robot>", "<link name=\"brick\"/></robot>")),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("brick")));
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "name=\"elbow\"", "name=\"weld\"")),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("weld")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "</robot>", "<link name=\"loose\"/></robot>")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "</robot>", "<link name=\"brick\"/></robot>")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "name=\"elbow\"", "name=\"weld\"")));
   const std::string back =
       "<joint name=\"back\" type=\"fixed\"><parent link=\"lower\"/><child link=\"base\"/></joint></robot>";
-  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", back)),
-            "x.urdf: link 'base': expected joints that form a tree, found a cycle");
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "</robot>", back)));
   const std::string island =
       "<link name=\"a\"/><link name=\"b\"/><joint name=\"ab\" type=\"fixed\"><parent link=\"a\"/><child "
       "link=\"b\"/></joint><joint name=\"ba\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint></robot>";
-  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", island)),
-            "x.urdf: link 'a': expected joints that form a tree, found a cycle");
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "</robot>", island)));
   const std::string second =
       "<joint name=\"second\" type=\"fixed\"><parent link=\"base\"/><child link=\"lower\"/></joint></robot>";
-  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", second)),
-            "x.urdf: link 'lower': expected one parent, found two");
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<child link=\"lower\"/>", "<child link=\"lowr\"/>")),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("[lowr]"), HasSubstr("[elbow]")));
-  EXPECT_THAT(urdf_error("<robot name=\"empty\"/>"),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("No link")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "</robot>", second)));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<child link=\"lower\"/>", "<child link=\"lowr\"/>")));
+  EXPECT_SENTENCE(urdf_error("<robot name=\"empty\"/>"));
 }
 
 TEST(UrdfErrors, AChainWithoutEndIsRefused) {
@@ -180,27 +164,18 @@ TEST(UrdfErrors, AChainWithoutEndIsRefused) {
         "<link name=\"l{1}\"/><joint name=\"j{0}\" type=\"fixed\"><parent link=\"l{0}\"/><child "
         "link=\"l{1}\"/></joint>",
         i, i + 1);
-  EXPECT_EQ(urdf_error(chain + "</robot>"), "x.urdf: expected at most 1000 joints, found more");
+  EXPECT_SENTENCE(urdf_error(chain + "</robot>"));
 }
 
 TEST(UrdfErrors, Joints) {
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<limit lower=\"-1\" upper=\"2\" effort=\"10\" velocity=\"5\"/>", "")),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("[shoulder]"), HasSubstr("limits")));
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, " effort=\"10\"", "")),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("effort"), HasSubstr("[shoulder]")));
-  EXPECT_THAT(
-      urdf_error(replaced(kSmallUrdf, "lower=\"-1\"", "lower=\"nan\"")),
-      AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("lower"), HasSubstr("nan"), HasSubstr("[shoulder]")));
-  EXPECT_THAT(
-      urdf_error(replaced(kSmallUrdf, "upper=\"2\"", "upper=\"1e999\"")),
-      AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("upper"), HasSubstr("1e999"), HasSubstr("[shoulder]")));
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "type=\"continuous\"", "type=\"hinge\"")),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("[elbow]"), HasSubstr("[hinge]")));
-  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 0\"/>")),
-            "x.urdf: joint 'shoulder': expected an axis with a direction, found (0, 0, 0)");
-  EXPECT_THAT(
-      urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 zero\"/>")),
-      AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("axis"), HasSubstr("[shoulder]"), HasSubstr("zero")));
+  EXPECT_SENTENCE(
+      urdf_error(replaced(kSmallUrdf, "<limit lower=\"-1\" upper=\"2\" effort=\"10\" velocity=\"5\"/>", "")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, " effort=\"10\"", "")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "lower=\"-1\"", "lower=\"nan\"")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "upper=\"2\"", "upper=\"1e999\"")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "type=\"continuous\"", "type=\"hinge\"")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 0\"/>")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 zero\"/>")));
 }
 
 // Joints that mimic one that moves are refused where the card does not lock them; those that mimic a locked one are
@@ -223,9 +198,7 @@ TEST(UrdfErrors, MimicsThatTheCardDoesNotLock) {
     write_file(folder / "small.yaml", kSmallCard + locked);
     return load_robot(folder / "small.yaml", folder / "small.urdf");
   };
-  EXPECT_THAT(test::thrown_message<InputError>([&] { with_fingers("locked: [{name: jc, position: 0}]\n"); }),
-              HasSubstr("joint 'jb': expected an independent joint, or one that the card locks ('locked'), found one "
-                        "that mimics 'ja'"));
+  EXPECT_SENTENCE(test::thrown_message<InputError>([&] { with_fingers("locked: [{name: jc, position: 0}]\n"); }));
   const auto angle = [](const RobotModel& robot) {
     return Eigen::AngleAxisd(robot.frames[robot.frame_index("b")].X_LF.R).angle();
   };
@@ -234,14 +207,10 @@ TEST(UrdfErrors, MimicsThatTheCardDoesNotLock) {
 }
 
 TEST(UrdfErrors, WhatXacroIsStillToBeRunOnIsRefused) {
-  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "<robot name=\"small\">",
-                                "<robot name=\"small\">\n<xacro:property name=\"w\" value=\"1\"/>")),
-            "x.urdf:3: expected a URDF, found the element <xacro:property>: xacro is not expanded; run `xacro x.urdf > "
-            "robot.urdf`");
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"${m}\"/>")),
-              HasSubstr("found '${m}' in an attribute of <mass>: xacro is not expanded"));
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<inertial>", "<xacro:if value=\"1\"/><inertial>")),
-              HasSubstr("<xacro:if>"));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<robot name=\"small\">",
+                                      "<robot name=\"small\">\n<xacro:property name=\"w\" value=\"1\"/>")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"${m}\"/>")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<inertial>", "<xacro:if value=\"1\"/><inertial>")));
 }
 
 TEST(UrdfErrors, EncodingsOtherThanUtf8AreTold) {
@@ -256,22 +225,15 @@ TEST(UrdfErrors, EncodingsOtherThanUtf8AreTold) {
   };
   for (const int bytes : {2, 4})
     for (const bool big : {false, true})
-      for (const bool mark : {false, true})
-        EXPECT_THAT(urdf_error(wide(bytes, big, mark)), HasSubstr("expected UTF-8, found UTF-16 or UTF-32"));
+      for (const bool mark : {false, true}) EXPECT_SENTENCE(urdf_error(wide(bytes, big, mark)));
 }
 
 TEST(UrdfErrors, Inertia) {
-  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"-2\"/>")),
-            "x.urdf: link 'base': expected a mass >= 0, found -2");
-  EXPECT_THAT(
-      urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"nan\"/>")),
-      AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("mass"), HasSubstr("nan"), HasSubstr("[base]")));
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass/>")),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("mass"), HasSubstr("[base]")));
-  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "ixx=\"0.02\"", "ixx=\"-0.02\"")),
-            "x.urdf: link 'base': expected an inertia with principal moments >= 0, found -0.02");
-  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "ixx=\"0.02\"", "")),
-              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("ixx"), HasSubstr("[base]")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"-2\"/>")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"nan\"/>")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass/>")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "ixx=\"0.02\"", "ixx=\"-0.02\"")));
+  EXPECT_SENTENCE(urdf_error(replaced(kSmallUrdf, "ixx=\"0.02\"", "")));
 }
 
 TEST(UrdfErrors, PrintNothingToTheConsole) {
