@@ -273,9 +273,9 @@ TEST(GyroFrame, IsTheCardsWhereTheChannelNamesNone) {
     controller->act(of_base.state, of_base.reference, command);
     return memory.shown[0];
   };
-  EXPECT_EQ(excerpt("torso_link", ""), excerpt("pelvis", "torso_link"));
-  EXPECT_EQ(excerpt("torso_link", "pelvis"), excerpt("pelvis", ""));
-  EXPECT_NE(excerpt("torso_link", ""), excerpt("pelvis", ""));
+  EXPECT_EQ(shown("torso_link", ""), shown("pelvis", "torso_link"));
+  EXPECT_EQ(shown("torso_link", "pelvis"), shown("pelvis", ""));
+  EXPECT_NE(shown("torso_link", ""), shown("pelvis", ""));
 }
 
 TEST(GyroFrame, ThatTheRobotLacksIsRefused) {

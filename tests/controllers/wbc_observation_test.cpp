@@ -109,7 +109,7 @@ TEST(WbcObservation, IsTheBitsThatNetworksWereTrainedOn) {
     past.insert(past.end(), frame.begin(), frame.end());
     const std::span<const float> student = observer.update(sensors, action);
     ASSERT_EQ(std::vector<float>(student.begin(), student.end()), now) << tick;
-    std::vector<float> excerpt(163);
+    std::vector<float> shown(163);
     write_oracle(sensors, action, shown);
     ASSERT_EQ(shown, oracle) << tick;
   }

@@ -21,7 +21,7 @@ ObservationFrame random_frame(Random& random) {
   return frame;
 }
 
-Eigen::VectorXd excerpt(const FrameSenses& senses, ChannelKind angles = ChannelKind::kJointAngle) {
+Eigen::VectorXd shown(const FrameSenses& senses, ChannelKind angles = ChannelKind::kJointAngle) {
   std::vector<float> numbers(kObservationSize);
   write_frame(frame_channels(angles), senses, numbers);
   return Eigen::Map<const Eigen::VectorXf>(numbers.data(), kObservationSize).cast<double>();
@@ -32,7 +32,7 @@ TEST(FrameChannels, InTheWorldHaveTheLayoutOfTheSupplement) {
   const ObservationFrame frame = random_frame(random);
   const RobotState& robot = frame.robot;
   const Eigen::Vector3d start(0.1, 0.2, 0.3);
-  const Eigen::VectorXd vector = excerpt(FrameSenses::in_world(frame, *g1(), {}, start));
+  const Eigen::VectorXd vector = shown(FrameSenses::in_world(frame, *g1(), {}, start));
   EXPECT_TRUE(vector.segment<3>(0).isApprox(frame.partner.col(0), kFloat));
   for (int j = 0; j < 24; ++j) EXPECT_TRUE(vector.segment<3>(3 + 3 * j).isApprox(frame.partner.col(j), kFloat)) << j;
   EXPECT_NEAR((robot.X_WB.R * vector.segment<3>(75) - robot.v_WB).norm(), 0.0, kFloat);
@@ -57,7 +57,7 @@ TEST(FrameChannels, OfTheRobotDoNotChangeWhenTheWorldIsTurned) {
   moved.robot.v_WB = X_VW.R * frame.robot.v_WB;
   for (int j = 0; j < kSmplJoints; ++j) moved.partner.col(j) = X_VW * Eigen::Vector3d(frame.partner.col(j));
   const auto ego = [](const ObservationFrame& of) {
-    return excerpt(FrameSenses::in_ego(of, *g1(), {}, ego_frame(of.robot).inverse()), ChannelKind::kJointPosition);
+    return shown(FrameSenses::in_ego(of, *g1(), {}, ego_frame(of.robot).inverse()), ChannelKind::kJointPosition);
   };
   EXPECT_NEAR((ego(moved) - ego(frame)).cwiseAbs().maxCoeff(), 0.0, 4.0 * kFloat);
   EXPECT_TRUE(ego(frame).segment<29>(84).isApprox(frame.robot.q - g1()->neutral, kFloat));
@@ -87,9 +87,9 @@ TEST(FrameChannels, AreTheSameForBothSignsOfAQuaternion) {
   Random random(2, 1);
   for (int i = 0; i < 10; ++i) {
     ObservationFrame frame = random_frame(random);
-    const Eigen::VectorXd vector = excerpt(FrameSenses::in_world(frame, *g1(), {}, {0, 0, 0}));
+    const Eigen::VectorXd vector = shown(FrameSenses::in_world(frame, *g1(), {}, {0, 0, 0}));
     frame.robot.X_WB.R.coeffs() *= -1.0;
-    EXPECT_NEAR((excerpt(FrameSenses::in_world(frame, *g1(), {}, {0, 0, 0})) - vector).norm(), 0.0, kFloat);
+    EXPECT_NEAR((shown(FrameSenses::in_world(frame, *g1(), {}, {0, 0, 0})) - vector).norm(), 0.0, kFloat);
   }
 }
 
