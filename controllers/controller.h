@@ -37,6 +37,8 @@ struct ControllerInfo {
   std::string robot;  // the card it was made for, by name or path; rollouts use that body. "": any
   bool walks = false;
   std::vector<ControllerOption> options;
+  // Default angles of the joints that it leaves to the reference: the pose in which it was made to walk [rad].
+  std::map<std::string, double> posture = {};
 };
 
 // Keeps numbers that are not finite away from the motors, whatever the controller does. Wraps any controller; every

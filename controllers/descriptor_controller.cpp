@@ -290,11 +290,15 @@ class DescriptorController final : public Controller {
 }  // namespace
 
 ControllerInfo descriptor_info(const Descriptor& descriptor) {
+  std::map<std::string, double> posture;
+  for (const DescriptorJoint& joint : descriptor.joints)
+    if (!joint.action) posture[joint.name] = joint.neutral;
   return {.name = descriptor.name,
           .about = fmt::format("{} (licence: {})", descriptor.about, descriptor.licence),
           .robot = descriptor.robot,
           .walks = descriptor.walks,
-          .options = option_list<ControllerOption>(option_table(descriptor), defaults_of(descriptor))};
+          .options = option_list<ControllerOption>(option_table(descriptor), defaults_of(descriptor)),
+          .posture = std::move(posture)};
 }
 
 std::unique_ptr<Controller> make_descriptor_controller(

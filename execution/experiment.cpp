@@ -185,11 +185,22 @@ Rollout Experiment::executed(const EpisodeSpec& spec, const Setup& setup, Leader
   return roll_out(setup, *backend, *controller_of(spec), leader);
 }
 
+// The neutral pose, with the joints that a controller leaves to the reference where it was made to have them.
+Eigen::VectorXd posture_of(const SuiteController& controller, const RobotModel& robot) {
+  Eigen::VectorXd q = robot.neutral;
+  for (const auto& [name, angle] : about(controller).posture)
+    if (const int joint = robot.joint_index(name); joint >= 0) q[joint] = angle;
+  return q;
+}
+
 // An episode that a commanded velocity leads.
 void Experiment::simulate_walk(const EpisodeSpec& spec, const EpisodeOverrides& overrides, EpisodeRow& row) const {
   require(!overrides.world, "episode: expected one of a clip, found a walking command");
-  StreamReference stream(spec.body->robot, stream_options(*spec.reference), spec.seed);
   Episode episode{conditions(spec, {}), ticks_of(spec.reference->seconds), {}, nullptr};
+  episode.start.q = posture_of(*spec.controller, *spec.body->robot);
+  StreamOptions options = stream_options(*spec.reference);
+  options.posture = episode.start.q;
+  StreamReference stream(spec.body->robot, options, spec.seed);
   if (overrides.stop_asked) episode.stop_asked = overrides.stop_asked;
   const Rollout rollout = executed(spec, episode, stream, row);
   if (rollout.interrupted) throw EpisodeInterrupted();

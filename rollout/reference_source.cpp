@@ -58,7 +58,11 @@ ReferenceStream::ReferenceStream(std::shared_ptr<const RobotModel> robot, const 
     for (const RobotMotion& motion : *options.data)
       require(motion.q.rows() == robot_->dof(), "reference stream: a motion of {} joints for a robot of {}",
               motion.q.rows(), robot_->dof());
-  reference_.q = from_ = to_ = robot_->neutral;
+  reference_.q = from_ = to_ = neutral();
+}
+
+const Eigen::VectorXd& ReferenceStream::neutral() const {
+  return options_.posture ? *options_.posture : robot_->neutral;
 }
 
 void ReferenceStream::reset(Random& random) {
@@ -68,9 +72,9 @@ void ReferenceStream::reset(Random& random) {
   velocity_.setZero();
   motion_ = nullptr;
   reference_.X_WB = {Eigen::Quaterniond::Identity(), {0.0, 0.0, height_}};
-  reference_.q = robot_->neutral;
+  reference_.q = neutral();
   draw_pose(random, from_);
-  if (options_.from_neutral) from_ = robot_->neutral;
+  if (options_.from_neutral) from_ = neutral();
   draw_pose(random, to_);
   segment_ = 0.0;
   segment_length_ = random.uniform(0.6, 2.0);
@@ -108,13 +112,13 @@ void ReferenceStream::follow_motion() {
 }
 
 void ReferenceStream::draw_pose(Random& random, Eigen::VectorXd& q) const {
-  q = robot_->neutral;
+  q = neutral();
   if (!options_.moves_upper_body && !options_.holds_upper_body) return;
   // Some goals are the neutral pose; one that is held is not.
   const double share = !options_.holds_upper_body && random.chance(0.25) ? 0.0 : 1.0;
   for (const int joint : upper_) {
     const auto range = robot_->roles.pose_ranges.find(joint);
-    const double still = robot_->neutral[joint];
+    const double still = neutral()[joint];
     const auto [low, high] = range == robot_->roles.pose_ranges.end() ? std::pair(still, still) : range->second;
     const double drawn = random.uniform(low, high);
     q[joint] += share * (drawn - q[joint]);

@@ -37,6 +37,7 @@ struct StreamOptions {
   double motions = 0.0;           // share of episodes that follow one of `data`
   std::shared_ptr<const std::vector<RobotMotion>> data;  // shared by all streams; read-only
   std::optional<ScriptedCommand> script;                 // in place of random commands
+  std::optional<Eigen::VectorXd> posture;                // joints in the place of the robot's neutral ones [rad]
 };
 
 class ReferenceStream {
@@ -52,6 +53,7 @@ class ReferenceStream {
   [[nodiscard]] const Eigen::Vector3d& command() const { return velocity_; }  // that moves the root now
 
  private:
+  [[nodiscard]] const Eigen::VectorXd& neutral() const;
   void draw_pose(Random& random, Eigen::VectorXd& q) const;
   void draw_command(Random& random);
   void follow_script();

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <set>
 
+#include "duet/archives/recording_file.h"
 #include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
@@ -362,6 +363,44 @@ TEST(Runner, AsksOfTheCardBeforeTheFirstEpisode) {
   }());
   EXPECT_THAT(test::thrown_message<InputError>([&] { run(walk, folder / "d"); }),
               HasSubstr("found no shapes with sole: true"));
+}
+
+Suite walking_suite(const std::string& controller, const std::string& engine, double seconds) {
+  return parse_suite(fmt::format("schema: duet.suite/1\nname: walk\nversion: 1.0.0\nengines: [{}]\ncontrollers: [{}]\n"
+                                 "reference: [{{velocity: [0.5, 0, 0], seconds: {}}}]\nrecord: {{trajectories: all}}\n",
+                                 engine, controller, seconds),
+                     "walk.yaml");
+}
+
+// A walker that leaves joints to the reference is led in the pose in which it was made to walk, and begins in it.
+TEST(Runner, AWalkerIsLedInItsOwnPosture) {
+  const test::ScratchFolder folder;
+  register_controller({.name = "armless",
+                       .about = "a controller that leaves an elbow alone",
+                       .robot = "g1",
+                       .walks = true,
+                       .posture = {{"left_elbow_joint", 0.25}}},
+                      [](const std::shared_ptr<const RobotModel>& robot, const ControllerOptions&) {
+                        return make_pd_controller(robot);
+                      });
+  run(walking_suite("armless", "playback", 0.4), folder / "run");
+  const std::filesystem::directory_iterator files(folder / "run/trajectories");
+  const Recording recording = load_recording(files->path());
+  const auto robot = load_robot("g1");
+  EXPECT_EQ(recording.robot[0].q[robot->joint_index("left_elbow_joint")], 0.25);
+  EXPECT_EQ(recording.robot[0].q[robot->joint_index("right_elbow_joint")],
+            robot->neutral[robot->joint_index("right_elbow_joint")]);
+}
+
+// Its arms have to stay near 0: in the robot's neutral pose it falls after 2.5 s.
+TEST(Runner, FalconsPrecursorWalksInTheWalkingSuite) {
+  const std::string network = test::shared_file("models/falcon/dec_loco_g1_29dof.onnx");
+  if (network.empty()) GTEST_SKIP() << "not run: models/falcon/dec_loco_g1_29dof.onnx absent";
+  if (!is_available("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  const test::ScratchFolder folder;
+  Suite walk = walking_suite("falcon_dec_loco", "mujoco", 5.0);
+  walk.controllers[0].options["network"] = network;
+  EXPECT_EQ(run(walk, folder / "run").outcomes.count("fell"), 0U);
 }
 
 TEST(Runner, SaysTheFirstErrorWithItsEpisode) {
