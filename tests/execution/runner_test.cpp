@@ -14,6 +14,7 @@
 #include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/clips.h"
+#include "duet/robots/robot_cards.h"
 #include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
@@ -386,10 +387,10 @@ TEST(Runner, AWalkerIsLedInItsOwnPosture) {
   run(walking_suite("armless", "playback", 0.4), folder / "run");
   const std::filesystem::directory_iterator files(folder / "run/trajectories");
   const Recording recording = load_recording(files->path());
-  const auto robot = load_robot("g1");
-  EXPECT_EQ(recording.robot[0].q[robot->joint_index("left_elbow_joint")], 0.25);
-  EXPECT_EQ(recording.robot[0].q[robot->joint_index("right_elbow_joint")],
-            robot->neutral[robot->joint_index("right_elbow_joint")]);
+  const RobotModel robot = load_robot(shipped_card("g1"));
+  EXPECT_EQ(recording.robot[0].q[robot.joint_index("left_elbow_joint")], 0.25);
+  EXPECT_EQ(recording.robot[0].q[robot.joint_index("right_elbow_joint")],
+            robot.neutral[robot.joint_index("right_elbow_joint")]);
 }
 
 // Its arms have to stay near 0: in the robot's neutral pose it falls after 2.5 s.
