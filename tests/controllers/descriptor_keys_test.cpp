@@ -1,7 +1,5 @@
 // Effects of a descriptor's keys that no network of the first six needed: a command by its axes, a stance, clocks
 // that hold and warp, actions around two poses, states, the gyro's frame. The network is a fake.
-#include <gmock/gmock.h>
-
 #include <cmath>
 #include <numbers>
 
@@ -18,7 +16,6 @@ namespace {
 using test::kNear;
 using test::Layout;
 using test::thrown_message;
-using ::testing::HasSubstr;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -215,11 +212,9 @@ TEST(StateInput, ThatDoesNotFitItsOutputIsRefused) {
                           const std::vector<Port>& outputs) {
     return thrown_message<InputError>([&] { Layout(with_state(output), inputs, outputs); });
   };
-  EXPECT_THAT(refusal("next", {{"x", 47}, {"h", 3}}, {{"y", 12}, {"next_h", 3}}),
-              AllOf(HasSubstr("rl_gym.yaml:60: with fake: "), HasSubstr("unknown output 'next'")));
-  EXPECT_THAT(refusal("next_h", {{"x", 47}, {"h", 3}}, {{"y", 12}, {"next_h", 4}}),
-              HasSubstr("input 'h': expected 3 numbers, found 4 of the output 'next_h'"));
-  EXPECT_THAT(refusal("next_h", {{"x", 47}, {"g", 3}}, {{"y", 12}, {"next_h", 3}}), HasSubstr("unknown input 'h'"));
+  EXPECT_SENTENCE(refusal("next", {{"x", 47}, {"h", 3}}, {{"y", 12}, {"next_h", 3}}));
+  EXPECT_SENTENCE(refusal("next_h", {{"x", 47}, {"h", 3}}, {{"y", 12}, {"next_h", 4}}));
+  EXPECT_SENTENCE(refusal("next_h", {{"x", 47}, {"g", 3}}, {{"y", 12}, {"next_h", 3}}));
 }
 
 // The frame's rate by the difference of its poses a moment apart.
@@ -281,8 +276,7 @@ TEST(GyroFrame, IsTheCardsWhereTheChannelNamesNone) {
 TEST(GyroFrame, ThatTheRobotLacksIsRefused) {
   Channel gyro = channel_of(ChannelKind::kBaseAngularVelocity);
   gyro.frame = "torso_lnk";
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { layout_of(showing({gyro}), {}); }),
-              HasSubstr("unknown frame 'torso_lnk': did you mean 'torso_link'?"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { layout_of(showing({gyro}), {}); }));
 }
 
 TEST(CardByPath, IsTheBodyOfItsController) {

@@ -18,7 +18,6 @@ namespace {
 using test::kNear;
 using test::Layout;
 using test::thrown_message;
-using ::testing::HasSubstr;
 
 TEST(RlGymLayout, IsThe47NumbersOfItsDeployment) {
   Layout l("rl_gym", 47, 12, {{"command", "0.5,-0.3,0.8"}});

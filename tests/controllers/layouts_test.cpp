@@ -1,6 +1,4 @@
 // Laws for the layouts of all published controllers: resets, allocation, and what is refused.
-#include <gmock/gmock.h>
-
 #include "duet/core/require.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/controllers/layout.h"
@@ -11,7 +9,6 @@ namespace {
 
 using test::Layout;
 using test::thrown_message;
-using ::testing::HasSubstr;
 
 TEST(Layouts, StartAgainAtAReset) {
   for (const auto& [name, input, output] :
@@ -51,15 +48,10 @@ TEST(Layouts, AreFilledWithoutAllocation) {
 
 TEST(Layouts, RefuseANetworkOfAnotherSizeWithThePlacesOfTheChannels) {
   const std::string message = thrown_message<InputError>([] { Layout("rl_gym", 48, 12); });
-  EXPECT_THAT(message, HasSubstr("rl_gym.yaml:"));
-  EXPECT_THAT(message,
-              HasSubstr("input 'x': expected 48 numbers, found 47 of the channels: base_angular_velocity 0..2"));
-  EXPECT_THAT(message, HasSubstr("gait_sine 45, gait_cosine 46"));
-  EXPECT_THAT(thrown_message<InputError>([] { Layout("homie", 400, 12); }), HasSubstr("(6 frames of 76)"));
-  EXPECT_THAT(thrown_message<InputError>([] { Layout("rl_gym", 47, 29); }),
-              HasSubstr("output 'y': expected 12 numbers, one for each joint with an action, found 29"));
-  EXPECT_THAT(thrown_message<InputError>([] { Layout("beyond_mimic", 160, 29, {}, "observation", "actions"); }),
-              HasSubstr("unknown input 'obs'"));
+  EXPECT_SENTENCE(message);
+  EXPECT_SENTENCE(thrown_message<InputError>([] { Layout("homie", 400, 12); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([] { Layout("rl_gym", 47, 29); }));
+  EXPECT_SENTENCE(thrown_message<InputError>([] { Layout("beyond_mimic", 160, 29, {}, "observation", "actions"); }));
 }
 
 TEST(Layouts, RefuseARobotOfOtherJoints) {
@@ -72,29 +64,15 @@ TEST(Layouts, RefuseARobotOfOtherJoints) {
                                  "fake");
     });
   };
-  EXPECT_THAT(
-      make("twist2", "g1_12dof", 1432, 29),
-      AllOf(HasSubstr("twist2.yaml: controller 'twist2' with robot 'g1_12dof': unknown joint 'waist_yaw_joint'")));
-  EXPECT_THAT(make("twist2", "g1_27dof", 1432, 29), HasSubstr("it was made for 'g1_twist2'"));
+  EXPECT_SENTENCE(make("twist2", "g1_12dof", 1432, 29));
+  EXPECT_SENTENCE(make("twist2", "g1_27dof", 1432, 29));
 }
 
 TEST(Layouts, RefuseOptionsValuesTheyDoNotKnow) {
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
-                Layout("homie", 456, 12, {{"command", "1,2"}});
-              }),
-              HasSubstr("expected \"vx,vy,wz\" or \"vx,vy,wz,height\", found '1,2'"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
-                Layout("homie", 456, 12, {{"conversion", "direkt"}});
-              }),
-              HasSubstr("unknown conversion 'direkt': did you mean 'direct'?"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
-                Layout("homie", 456, 12, {{"waist", "stiff"}});
-              }),
-              HasSubstr("controller 'homie': unknown waist 'stiff'. Known: free, locked"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
-                Layout("homie", 456, 12, {{"yaw_scale", "fast"}});
-              }),
-              HasSubstr("yaw_scale: expected a finite number, found 'fast'"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { Layout("homie", 456, 12, {{"command", "1,2"}}); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { Layout("homie", 456, 12, {{"conversion", "direkt"}}); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { Layout("homie", 456, 12, {{"waist", "stiff"}}); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { Layout("homie", 456, 12, {{"yaw_scale", "fast"}}); }));
 }
 
 }  // namespace

@@ -10,7 +10,6 @@ namespace duet {
 namespace {
 
 using test::thrown_message;
-using ::testing::HasSubstr;
 
 TEST(Controllers, AreMadeByNameAndKnowTheirs) {
   EXPECT_THAT(controller_names(), ::testing::IsSupersetOf({"pd", "vmc"}));
@@ -34,13 +33,9 @@ TEST(Controllers, AreDescribedInOneLineEach) {
 
 TEST(Controllers, RefuseAnUnknownNameAndNoRobot) {
   const std::string message = thrown_message<std::invalid_argument>([] { make_controller("vcm", test::g1()); });
-  EXPECT_THAT(message, HasSubstr("unknown controller 'vcm'"));
-  EXPECT_THAT(message, HasSubstr("'vmc'"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { make_controller("pd", nullptr); }), HasSubstr("no robot"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
-                make_controller("pd", test::g1(), {{"gain", "2"}});
-              }),
-              HasSubstr("controller 'pd': expected no option, found 'gain'"));
+  EXPECT_SENTENCE(message);
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { make_controller("pd", nullptr); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { make_controller("pd", test::g1(), {{"gain", "2"}}); }));
 }
 
 TEST(Pd, IsTheCardsGainsAroundTheReference) {

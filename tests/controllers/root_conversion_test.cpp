@@ -1,7 +1,5 @@
 #include "duet/controllers/root_conversion.h"
 
-#include <gmock/gmock.h>
-
 #include <numbers>
 
 #include "tests/support.h"
@@ -161,9 +159,7 @@ TEST(VelocityCommandText, IsThreeOrFourNumbers) {
   EXPECT_EQ(command.height, 0.74);
   EXPECT_EQ(parse_velocity_command("0,0,0,0.5", 0.74).height, 0.5);
   for (const char* bad : {"", "1", "1,2", "1,2,x", "1,2,nan", "1,2,3,4,5", "1,,2"})
-    EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { parse_velocity_command(bad, 0.7); }),
-                ::testing::HasSubstr("option 'command': expected \"vx,vy,wz\""))
-        << bad;
+    EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { parse_velocity_command(bad, 0.7); }));
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "duet/controllers/stance.h"
 
-#include <gmock/gmock.h>
-
 #include "duet/controllers/vmc.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
@@ -11,7 +9,6 @@ namespace duet {
 namespace {
 
 using test::thrown_message;
-using ::testing::HasSubstr;
 
 TEST(Stance, LegsOfTheG1AreItsFirstTwelveJoints) {
   const auto robot = test::g1();
@@ -46,10 +43,8 @@ TEST(Stance, PointsAreOnTheGroundWhereTheRobotStandsAndMoveAsTheJacobianSays) {
 }
 
 TEST(Stance, RobotsThatCannotStandAreRefused) {
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { make_vmc_controller(test::wheel()); }),
-              HasSubstr("'wheel' has no soles"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { make_vmc_controller(test::sledge()); }),
-              HasSubstr("'sledge' has soles at its base 'base'"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { make_vmc_controller(test::wheel()); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { make_vmc_controller(test::sledge()); }));
 }
 
 }  // namespace

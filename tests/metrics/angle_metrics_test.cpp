@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include <cmath>
 #include <numbers>
@@ -9,8 +8,6 @@
 
 namespace duet {
 namespace {
-
-using ::testing::HasSubstr;
 
 Eigen::MatrixXd table() {  // 2 joints, 4 frames
   Eigen::MatrixXd m(2, 4);
@@ -80,26 +77,17 @@ TEST(AngleMetrics, RefuseBadInput) {
   const auto of = [](const auto& action) { return test::thrown_message<std::invalid_argument>(action); };
   Eigen::MatrixXd bad = table();
   bad(1, 2) = std::nan("");
-  EXPECT_THAT(of([&] { (void)hinge_magnitudes(bad); }), HasSubstr("q is not finite at frame 2, joint 1"));
-  EXPECT_THAT(of([&] { (void)large_angle_ratio(bad); }), HasSubstr("large_angle_ratio: magnitudes is not finite"));
-  EXPECT_THAT(of([&] { (void)angle_std(Eigen::MatrixXd()); }), HasSubstr("angle_std: magnitudes is empty"));
-  EXPECT_THAT(of([&] { (void)angle_std(table(), AngleStd::kPooled, 2); }), HasSubstr("ddof must be 0 or 1, found 2"));
-  EXPECT_THAT(of([&] { (void)large_angle_ratio(table(), LargeAngle::kEntry, std::nan("")); }), HasSubstr("limit"));
-  EXPECT_THAT(of([&] { (void)grouped_magnitudes(table(), {}); }), HasSubstr("no groups"));
-  EXPECT_THAT(of([&] {
-                (void)grouped_magnitudes(table(), {{{0, 1}, {Eigen::Vector3d::UnitX()}}});
-              }),
-              HasSubstr("group 0 has 2 rows but 1 axes"));
-  EXPECT_THAT(of([&] { (void)grouped_magnitudes(table(), {{{}, {}}}); }), HasSubstr("group 0 has no hinge"));
-  EXPECT_THAT(of([&] {
-                (void)grouped_magnitudes(table(), {{{2}, {Eigen::Vector3d::UnitX()}}});
-              }),
-              HasSubstr("names row 2, but q has 2 joints"));
-  EXPECT_THAT(of([&] {
-                (void)grouped_magnitudes(table(), {{{0}, {Eigen::Vector3d::Zero()}}});
-              }),
-              HasSubstr("axis without direction"));
-  EXPECT_THAT(of([&] { (void)rotvec_magnitudes(PointTracks()); }), HasSubstr("rotvecs is empty"));
+  EXPECT_SENTENCE(of([&] { (void)hinge_magnitudes(bad); }));
+  EXPECT_SENTENCE(of([&] { (void)large_angle_ratio(bad); }));
+  EXPECT_SENTENCE(of([&] { (void)angle_std(Eigen::MatrixXd()); }));
+  EXPECT_SENTENCE(of([&] { (void)angle_std(table(), AngleStd::kPooled, 2); }));
+  EXPECT_SENTENCE(of([&] { (void)large_angle_ratio(table(), LargeAngle::kEntry, std::nan("")); }));
+  EXPECT_SENTENCE(of([&] { (void)grouped_magnitudes(table(), {}); }));
+  EXPECT_SENTENCE(of([&] { (void)grouped_magnitudes(table(), {{{0, 1}, {Eigen::Vector3d::UnitX()}}}); }));
+  EXPECT_SENTENCE(of([&] { (void)grouped_magnitudes(table(), {{{}, {}}}); }));
+  EXPECT_SENTENCE(of([&] { (void)grouped_magnitudes(table(), {{{2}, {Eigen::Vector3d::UnitX()}}}); }));
+  EXPECT_SENTENCE(of([&] { (void)grouped_magnitudes(table(), {{{0}, {Eigen::Vector3d::Zero()}}}); }));
+  EXPECT_SENTENCE(of([&] { (void)rotvec_magnitudes(PointTracks()); }));
 }
 
 }  // namespace

@@ -22,8 +22,8 @@ TEST(DetectorCatalogue, EveryFigureAndThresholdIsInTheCatalogue) {
     EXPECT_EQ(result.values.size(), detector_figures(task).size()) << to_string(task);
     for (const auto& [name, value] : result.values) EXPECT_EQ(detector_figure(task, name).name, name);
   }
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { (void)detector_figure(Task::kHug, "hands_distance"); }),
-              HasSubstr("did you mean 'hands_distance_min'"));
+  EXPECT_SENTENCE(
+      test::thrown_message<std::invalid_argument>([] { (void)detector_figure(Task::kHug, "hands_distance"); }));
 }
 
 TEST(DetectorCatalogue, RulesOfTheSetActHaveUnitsAndMeanings) {

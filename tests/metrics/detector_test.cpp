@@ -96,16 +96,13 @@ TEST(Detector, EveryTaskHasARuleOfTheSetAct) {
 
 TEST(Detector, ARuleRefusesWhatNoDetectorTakes) {
   Scene s = acting(Task::kHug, 1);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] {
-                (void)detect_by_rule(Task::kHug, s.performer, s.partner, {{"trunk", 0.4}});
-              }),
-              HasSubstr("did you mean 'trunks'"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] {
+    (void)detect_by_rule(Task::kHug, s.performer, s.partner, {{"trunk", 0.4}});
+  }));
   s.partner.torso.resize(3, 0);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
-                  [&] { (void)detect_by_rule(Task::kHug, s.performer, s.partner, {}); }),
-              HasSubstr("the track partner.torso is needed and empty"));
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { (void)parse_threshold_set("acts"); }),
-              HasSubstr("did you mean 'act'"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>(
+      [&] { (void)detect_by_rule(Task::kHug, s.performer, s.partner, {}); }));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { (void)parse_threshold_set("acts"); }));
 }
 
 TEST(Detector, NamesOfVersionsAndSets) {
@@ -319,9 +316,8 @@ TEST(Detector, DirectionsNeedTheOtherRootOrTheShoulders) {
     s.partner.root.resize(3, 0);
     EXPECT_NO_THROW((void)detect_performer(task, s.performer, s.partner, {}, readings));
     s.performer.rshoulder.resize(3, 0);
-    EXPECT_THAT(test::thrown_message<std::invalid_argument>(
-                    [&] { (void)detect_performer(task, s.performer, s.partner, {}, readings); }),
-                HasSubstr("performer.rshoulder is needed and empty"));
+    EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>(
+        [&] { (void)detect_performer(task, s.performer, s.partner, {}, readings); }));
   }
 }
 
@@ -332,10 +328,9 @@ TEST(Detector, RefusesUnknownAndInfiniteThresholds) {
   });
   EXPECT_THAT(unknown, HasSubstr("threshold of hug"));
   EXPECT_THAT(unknown, HasSubstr("'body'"));
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] {
-                (void)detect_performer(Task::kHug, s.performer, s.partner, {{"body", std::nan("")}});
-              }),
-              HasSubstr("threshold body of hug is not finite"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] {
+    (void)detect_performer(Task::kHug, s.performer, s.partner, {{"body", std::nan("")}});
+  }));
 }
 
 }  // namespace

@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include <cmath>
 
@@ -9,8 +8,6 @@
 
 namespace duet {
 namespace {
-
-using ::testing::HasSubstr;
 
 constexpr double kRate = 50.0;
 // Third differences at 50 Hz magnify rounding by 8 rate^3.
@@ -84,12 +81,12 @@ TEST(Jerk, DoesNotDependOnTheWorldFrameOrTimesDirection) {
 TEST(Jerk, RefusesBadInput) {
   const auto of = [](const auto& action) { return test::thrown_message<std::invalid_argument>(action); };
   const PointTracks four = test::random_points(4, 1, 1);
-  EXPECT_THAT(of([&] { (void)jerk(four.slice(0, 3), kRate); }), HasSubstr("jerk needs 4 frames or more, found 3"));
-  EXPECT_THAT(of([&] { (void)jerk(four, kRate, JerkScheme::kCentral); }), HasSubstr("needs 5 frames or more, found 4"));
-  EXPECT_THAT(of([&] { (void)jerk(four, 0.0); }), HasSubstr("rate must be positive"));
-  EXPECT_THAT(of([&] { (void)jerk(four, std::nan("")); }), HasSubstr("rate must be positive"));
-  EXPECT_THAT(of([&] { (void)jerk(four, kRate, JerkScheme::kDiff, 3); }), HasSubstr("ddof must be 0 or 1"));
-  EXPECT_THAT(of([&] { (void)jerk(PointTracks(), kRate); }), HasSubstr("positions is empty"));
+  EXPECT_SENTENCE(of([&] { (void)jerk(four.slice(0, 3), kRate); }));
+  EXPECT_SENTENCE(of([&] { (void)jerk(four, kRate, JerkScheme::kCentral); }));
+  EXPECT_SENTENCE(of([&] { (void)jerk(four, 0.0); }));
+  EXPECT_SENTENCE(of([&] { (void)jerk(four, std::nan("")); }));
+  EXPECT_SENTENCE(of([&] { (void)jerk(four, kRate, JerkScheme::kDiff, 3); }));
+  EXPECT_SENTENCE(of([&] { (void)jerk(PointTracks(), kRate); }));
   EXPECT_NO_THROW((void)jerk(four, kRate, JerkScheme::kGradient));
 }
 

@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include <cmath>
 
@@ -89,8 +88,7 @@ TEST(ObjectMetrics, NearestKeypointDecidesContact) {
 TEST(ObjectMetrics, OtherLengthsAreRefused) {
   PairedMotion motion = holding(4);
   motion.object.poses.pop_back();
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { object_metrics(motion, g1()); }),
-              testing::HasSubstr("expected motions of 3 frames, as the object has poses"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { object_metrics(motion, g1()); }));
 }
 
 }  // namespace

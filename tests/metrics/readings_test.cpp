@@ -71,10 +71,8 @@ TEST(Readings, MinFramesTakesWholeNumbersFromOne) {
   EXPECT_EQ(readings.metrics.min_frames, 12);
   EXPECT_EQ(reading(readings, "metrics.min_frames"), "12");
   for (const char* wrong : {"0", "-1", "2.5", "", "two", "3 ", "99999999999999999999"})
-    EXPECT_THAT(
-        test::thrown_message<std::invalid_argument>([&] { set_reading(readings, "metrics.min_frames", wrong); }),
-        HasSubstr("metrics.min_frames"))
-        << wrong;
+    EXPECT_SENTENCE(
+        test::thrown_message<std::invalid_argument>([&] { set_reading(readings, "metrics.min_frames", wrong); }));
 }
 
 TEST(Readings, RefusesUnknownNamesAndListsTheKnownOnes) {
@@ -87,14 +85,11 @@ TEST(Readings, RefusesUnknownNamesAndListsTheKnownOnes) {
       test::thrown_message<std::invalid_argument>([&] { set_reading(readings, "hug.single", "all"); });
   EXPECT_THAT(value, HasSubstr("hug.single"));
   EXPECT_THAT(value, HasSubstr("any_hand, same_hand, exactly_one, off"));
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { (void)reading(readings, "nothing"); }),
-              HasSubstr("nothing"));
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { (void)reading_values("nothing"); }),
-              HasSubstr("nothing"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { (void)reading(readings, "nothing"); }));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { (void)reading_values("nothing"); }));
   // root_jerk has no mean over axes.
-  EXPECT_THAT(
-      test::thrown_message<std::invalid_argument>([&] { set_reading(readings, "diagnostics.root_jerk", "mean_abs"); }),
-      HasSubstr("mean_norm, rms"));
+  EXPECT_SENTENCE(
+      test::thrown_message<std::invalid_argument>([&] { set_reading(readings, "diagnostics.root_jerk", "mean_abs"); }));
 }
 
 }  // namespace

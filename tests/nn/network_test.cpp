@@ -20,9 +20,7 @@
 namespace duet {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::FloatNear;
-using ::testing::HasSubstr;
 using ::testing::Pointwise;
 
 constexpr double kTolerance = 1e-5;
@@ -117,13 +115,11 @@ TEST(Network, APerceptronInSafetensorsIsRecognised) {
   EXPECT_THAT(test::evaluate(*network, {x})[0], Pointwise(FloatNear(1e-7), MlpRunner(mlp).run(x)));
   add_mlp(content, "teacher", mlp);
   write_safetensors(folder / "two", content);
-  EXPECT_THAT(test::thrown_message<InputError>([&] { load_network(folder / "two"); }),
-              HasSubstr("expected one multilayer perceptron ('<name>.0.weight'), found 2 [student, teacher]"));
+  EXPECT_SENTENCE(test::thrown_message<InputError>([&] { load_network(folder / "two"); }));
 }
 
 TEST(Network, UnknownEngineNamesThosePresent) {
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { load_network("x", "tensorrt"); }),
-              HasSubstr("no network engine 'tensorrt' in this build. It has: duet"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { load_network("x", "tensorrt"); }));
   EXPECT_EQ(network_engines().front(), "duet");
 }
 
@@ -133,20 +129,18 @@ TEST(Network, FilesThatAreNoNetworksAreRefused) {
     write_file(folder / "net", bytes);
     return test::thrown_message<InputError>([&] { load_network(folder / "net"); });
   };
-  EXPECT_THAT(refusal(""), HasSubstr("net': the file is empty"));
-  EXPECT_THAT(refusal("\x08"), HasSubstr("expected an ONNX model"));
+  EXPECT_SENTENCE(refusal(""));
+  EXPECT_SENTENCE(refusal("\x08"));
   // Files that a training keeps: torch.save, a pickle, NumPy's archive.
   const std::string saved = zip_bytes({{"model_100/data.pkl", "x"}, {"model_100/data/0", "1234"}});
   for (const std::string& weights : {saved, std::string("\x80\x02}q."), zip_bytes({{"w.npy", "x"}})})
-    EXPECT_THAT(refusal(weights), HasSubstr("a training checkpoint: it holds weights and says nothing of the network; "
-                                            "export the network itself"));
-  EXPECT_THAT(refusal("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\n"), HasSubstr("Git LFS pointer"));
-  EXPECT_THAT(refusal("<!DOCTYPE html><html>404</html>"), HasSubstr("HTML page"));
-  EXPECT_THAT(refusal("hello, this is a text"), HasSubstr("net': expected an ONNX model"));
-  EXPECT_THAT(refusal(zip_bytes({{"a/data.pkl", "x"}, {"a/code/m.py", ""}})),
-              HasSubstr("TorchScript of another kind; needs libtorch"));
-  EXPECT_THAT(refusal("PK and no more"), HasSubstr("not a zip archive or truncated"));
-  EXPECT_THAT(test::thrown_message<InputError>([&] { load_network(folder / "none"); }), HasSubstr("none"));
+    EXPECT_SENTENCE(refusal(weights));
+  for (const char* text : {"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\n",
+                           "<!DOCTYPE html><html>404</html>", "hello, this is a text"})
+    EXPECT_SENTENCE(refusal(text));
+  EXPECT_SENTENCE(refusal(zip_bytes({{"a/data.pkl", "x"}, {"a/code/m.py", ""}})));
+  EXPECT_SENTENCE(refusal("PK and no more"));
+  EXPECT_SENTENCE(test::thrown_message<InputError>([&] { load_network(folder / "none"); }));
 }
 
 TEST(Network, TruncatedPoliciesAreRefused) {
@@ -157,7 +151,7 @@ TEST(Network, TruncatedPoliciesAreRefused) {
     const std::string bytes = read_file(path);
     for (const double part : {0.01, 0.3, 0.9, 0.9999}) {
       write_file(folder / "cut", bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
-      EXPECT_THAT(test::thrown_message<InputError>([&] { load_network(folder / "cut"); }), HasSubstr("cut'")) << name;
+      EXPECT_SENTENCE(test::thrown_message<InputError>([&] { load_network(folder / "cut"); })) << name;
     }
   }
 }

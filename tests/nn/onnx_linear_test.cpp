@@ -1,15 +1,13 @@
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "tests/nn/evaluate.h"
 #include "tests/nn/onnx_writer.h"
+#include "tests/support.h"
 
 namespace duet::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 // Element (r, c) of a matrix of the operand, which starts at `from` and has `cols` columns.
 double element(const Operand& x, std::int64_t from, std::int64_t cols, std::int64_t r, std::int64_t c) {
@@ -133,18 +131,16 @@ std::string refusal(const std::string& op, const std::vector<Shape>& shapes, con
 }
 
 TEST(OnnxLinear, MisfitsAreRefused) {
-  EXPECT_EQ(refusal("Gemm", {{2, 3}, {2, 3}}),
-            "'test.onnx': node 'Gemm#0', operator Gemm: shapes (2, 3) and (2, 3) do not fit together");
-  EXPECT_THAT(refusal("Gemm", {{2, 3}, {3}}), HasSubstr("expected two matrices, found shapes (2, 3) and (3)"));
-  EXPECT_THAT(refusal("Gemm", {{2, 3}, {3, 4}, {5}}), HasSubstr("shapes (5) and (2, 4) do not fit together"));
-  EXPECT_THAT(refusal("Gemm", {{1, 3}, {3, 4}, {2, 4}}), HasSubstr("input 2: shape (2, 4) does not fit (1, 4)"));
-  EXPECT_THAT(refusal("MatMul", {{2, 3}, {2, 3}}), HasSubstr("do not fit together"));
-  EXPECT_THAT(refusal("MatMul", {{}, {2}}), HasSubstr("expected vectors or matrices, found a number"));
-  EXPECT_THAT(refusal("Conv", {{1, 3, 4, 4}, {2, 3, 2, 2}}), HasSubstr("expected a 1-D convolution"));
-  EXPECT_THAT(refusal("Conv", {{1, 3, 4}, {2, 2, 2}}), HasSubstr("do not fit together in 1 groups"));
-  EXPECT_THAT(refusal("Conv", {{1, 2, 3}, {2, 2, 4}}), HasSubstr("a kernel of 4 does not fit into 3"));
-  EXPECT_THAT(refusal("Conv", {{1, 2, 3}, {2, 2, 2}}, {{"strides", std::vector<std::int64_t>{0}}}),
-              HasSubstr("attribute 'strides': expected one number from 1"));
+  EXPECT_SENTENCE(refusal("Gemm", {{2, 3}, {2, 3}}));
+  EXPECT_SENTENCE(refusal("Gemm", {{2, 3}, {3}}));
+  EXPECT_SENTENCE(refusal("Gemm", {{2, 3}, {3, 4}, {5}}));
+  EXPECT_SENTENCE(refusal("Gemm", {{1, 3}, {3, 4}, {2, 4}}));
+  EXPECT_SENTENCE(refusal("MatMul", {{2, 3}, {2, 3}}));
+  EXPECT_SENTENCE(refusal("MatMul", {{}, {2}}));
+  EXPECT_SENTENCE(refusal("Conv", {{1, 3, 4, 4}, {2, 3, 2, 2}}));
+  EXPECT_SENTENCE(refusal("Conv", {{1, 3, 4}, {2, 2, 2}}));
+  EXPECT_SENTENCE(refusal("Conv", {{1, 2, 3}, {2, 2, 4}}));
+  EXPECT_SENTENCE(refusal("Conv", {{1, 2, 3}, {2, 2, 2}}, {{"strides", std::vector<std::int64_t>{0}}}));
 }
 
 }  // namespace

@@ -17,7 +17,6 @@ namespace duet {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 template <typename T>
 std::string bytes_of(std::vector<T> values) {
@@ -88,32 +87,26 @@ TEST(SafeTensors, EveryTypeIsReadAsFloat) {
 }
 
 TEST(SafeTensors, HeadersThatAreNotOnesAreRefused) {
-  EXPECT_THAT(refusal(""), HasSubstr("'net.safetensors': safetensors: expected 8 bytes of header length, found 0"));
-  EXPECT_THAT(refusal(bytes_of<std::uint64_t>({~std::uint64_t{0}})),
-              HasSubstr("expected a header of 18446744073709551615 bytes, found 0 (truncated?)"));
-  EXPECT_THAT(refusal(file_of("{\"w\":", "")), HasSubstr("safetensors: header: not valid JSON: parse error"));
-  EXPECT_THAT(refusal(file_of("{\"w\":" + test::deep_json() + "}", "")), HasSubstr(test::kTooDeep));
-  EXPECT_THAT(refusal(file_of("[]", "")), HasSubstr("expected a JSON object as header, found array"));
-  EXPECT_THAT(refusal(file_of(R"({"__metadata__":[]})", "")), HasSubstr("expected an object, found array"));
-  EXPECT_THAT(refusal(file_of(R"({"__metadata__":{"a":1}})", "")), HasSubstr("'a': expected a string, found number"));
-  EXPECT_THAT(refusal(file_of(R"({"w":3})", "")), HasSubstr("tensor 'w': expected an object, found number"));
+  EXPECT_SENTENCE(refusal(""));
+  EXPECT_SENTENCE(refusal(bytes_of<std::uint64_t>({~std::uint64_t{0}})));
+  EXPECT_SENTENCE(refusal(file_of("{\"w\":", "")));
+  EXPECT_SENTENCE(refusal(file_of("{\"w\":" + test::deep_json() + "}", "")));
+  for (const char* text : {"[]", R"({"__metadata__":[]})", R"({"__metadata__":{"a":1}})", R"({"w":3})"})
+    EXPECT_SENTENCE(refusal(file_of(text, "")));
 }
 
 TEST(SafeTensors, TensorsThatDoNotFitTheBytesAreRefused) {
   const std::string two = bytes_of<float>({1.0F, 2.0F});
-  EXPECT_THAT(refusal(one_tensor("F32", "[3]", two)),
-              HasSubstr("tensor 'w': shape (3) of F32 does not give the 8 bytes found"));
-  EXPECT_THAT(refusal(one_tensor("F32", "[4294967296,4294967296,2]", two)), HasSubstr("does not give the 8 bytes"));
-  EXPECT_THAT(refusal(one_tensor("F32", "[-2]", two)), HasSubstr("shape: expected whole numbers from 0"));
-  EXPECT_THAT(refusal(one_tensor("F32", "[2.0]", two)), HasSubstr("shape: expected whole numbers from 0"));
-  EXPECT_THAT(refusal(one_tensor("F32", "2", two)), HasSubstr("expected an array 'shape', found none"));
-  EXPECT_THAT(refusal(one_tensor("BF16", "[4]", two)),
-              HasSubstr("dtype: expected one of F16, F32, F64, I32, I64, found 'BF16'"));
+  EXPECT_SENTENCE(refusal(one_tensor("F32", "[3]", two)));
+  EXPECT_SENTENCE(refusal(one_tensor("F32", "[4294967296,4294967296,2]", two)));
+  EXPECT_SENTENCE(refusal(one_tensor("F32", "[-2]", two)));
+  EXPECT_SENTENCE(refusal(one_tensor("F32", "[2.0]", two)));
+  EXPECT_SENTENCE(refusal(one_tensor("F32", "2", two)));
+  EXPECT_SENTENCE(refusal(one_tensor("BF16", "[4]", two)));
   const std::string good = one_tensor("F32", "[2]", two);
-  EXPECT_THAT(refusal(good.substr(0, good.size() - 1)), HasSubstr("interval in [0, 7], found [0, 8] (truncated?)"));
-  EXPECT_THAT(refusal(good + "x"), HasSubstr("expected 8 bytes of tensors, found 9"));
-  EXPECT_THAT(refusal(file_of(R"({"w":{"dtype":"F32","shape":[],"data_offsets":[0,1,2]}})", two)),
-              HasSubstr("data_offsets: expected 2 numbers, found 3"));
+  EXPECT_SENTENCE(refusal(good.substr(0, good.size() - 1)));
+  EXPECT_SENTENCE(refusal(good + "x"));
+  EXPECT_SENTENCE(refusal(file_of(R"({"w":{"dtype":"F32","shape":[],"data_offsets":[0,1,2]}})", two)));
 }
 
 TEST(SafeTensors, OverlapsAndGapsAreRefused) {
@@ -123,19 +116,16 @@ TEST(SafeTensors, OverlapsAndGapsAreRefused) {
            std::to_string(begin) + "," + std::to_string(end) + "]}}";
   };
   EXPECT_EQ(refusal(file_of(header(4, 8), two)), "(nothing was thrown)");
-  EXPECT_THAT(refusal(file_of(header(2, 6), two)), HasSubstr("'b': expected to begin at byte 4, found 2 (overlap)"));
-  EXPECT_THAT(refusal(file_of(header(8, 12), two + "1234")),
-              HasSubstr("'b': expected to begin at byte 4, found 8 (gap)"));
-  EXPECT_THAT(refusal(file_of(header(8, 4), two)), HasSubstr("found [8, 4]"));
+  EXPECT_SENTENCE(refusal(file_of(header(2, 6), two)));
+  EXPECT_SENTENCE(refusal(file_of(header(8, 12), two + "1234")));
+  EXPECT_SENTENCE(refusal(file_of(header(8, 4), two)));
 }
 
 TEST(SafeTensors, NumbersThatFloatDoesNotHoldAreRefused) {
-  EXPECT_THAT(refusal(one_tensor("F32", "[2]", bytes_of<float>({1.0F, std::nanf("")}))),
-              HasSubstr("tensor 'w': expected finite numbers, found nan at index 1"));
-  EXPECT_THAT(refusal(one_tensor("F16", "[1]", bytes_of<std::uint16_t>({0x7C00}))), HasSubstr("found inf at index 0"));
-  EXPECT_THAT(refusal(one_tensor("F64", "[1]", bytes_of<double>({1e300}))), HasSubstr("found inf at index 0"));
-  EXPECT_THAT(refusal(one_tensor("I64", "[1]", bytes_of<std::int64_t>({(1 << 24) + 1}))),
-              HasSubstr("expected integers within 2^24, found a larger one at index 0"));
+  EXPECT_SENTENCE(refusal(one_tensor("F32", "[2]", bytes_of<float>({1.0F, std::nanf("")}))));
+  EXPECT_SENTENCE(refusal(one_tensor("F16", "[1]", bytes_of<std::uint16_t>({0x7C00}))));
+  EXPECT_SENTENCE(refusal(one_tensor("F64", "[1]", bytes_of<double>({1e300}))));
+  EXPECT_SENTENCE(refusal(one_tensor("I64", "[1]", bytes_of<std::int64_t>({(1 << 24) + 1}))));
 }
 
 TEST(SafeTensors, WhatCannotBeStoredIsNotWritten) {
@@ -144,19 +134,17 @@ TEST(SafeTensors, WhatCannotBeStoredIsNotWritten) {
     content.tensors[name] = tensor;
     return test::thrown_message<std::invalid_argument>([&] { safetensors_bytes(content, type); });
   };
-  EXPECT_THAT(message({{3}, {1.0F}}, TensorType::kF32), HasSubstr("shape (3) does not give the 1 values found"));
-  EXPECT_THAT(message({{-1}, {1.0F}}, TensorType::kF32), HasSubstr("shape (-1)"));
-  EXPECT_THAT(message({{1}, {65520.0F}}, TensorType::kF16), HasSubstr("tensor 'w': F16 cannot hold 65520"));
-  EXPECT_THAT(message({{1}, {std::numeric_limits<float>::infinity()}}, TensorType::kF32), HasSubstr("found inf"));
-  EXPECT_THAT(message({{1}, {1.0F}}, TensorType::kF32, "__metadata__"), HasSubstr("'__metadata__'"));
-  EXPECT_THAT(message({{1}, {1.0F}}, TensorType::kF32, "\xff"), HasSubstr("UTF-8"));
+  EXPECT_SENTENCE(message({{3}, {1.0F}}, TensorType::kF32));
+  EXPECT_SENTENCE(message({{-1}, {1.0F}}, TensorType::kF32));
+  EXPECT_SENTENCE(message({{1}, {65520.0F}}, TensorType::kF16));
+  EXPECT_SENTENCE(message({{1}, {std::numeric_limits<float>::infinity()}}, TensorType::kF32));
+  EXPECT_SENTENCE(message({{1}, {1.0F}}, TensorType::kF32, "__metadata__"));
+  EXPECT_SENTENCE(message({{1}, {1.0F}}, TensorType::kF32, "\xff"));
 }
 
 TEST(SafeTensors, AFolderThatCannotBeWrittenIsNamed) {
-  EXPECT_THAT(test::thrown_message<InputError>([] { write_safetensors("/proc/none/net", sample()); }),
-              HasSubstr("/proc/none/net"));
-  EXPECT_THAT(test::thrown_message<InputError>([] { read_safetensors("/proc/none/net"); }),
-              HasSubstr("/proc/none/net"));
+  EXPECT_SENTENCE(test::thrown_message<InputError>([] { write_safetensors("/proc/none/net", sample()); }));
+  EXPECT_SENTENCE(test::thrown_message<InputError>([] { read_safetensors("/proc/none/net"); }));
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include "duet/nn/torch/torch_script.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,8 +17,6 @@
 
 namespace duet::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 // An archive as PyTorch writes it: 5 inputs, 4 hidden, 3 and 2 outputs.
 struct Export {
@@ -138,22 +135,19 @@ TEST(TorchScript, OtherKindsAreRefused) {
     code.replace(code.find(text), text.size(), instead);
     return file.refusal();
   };
-  EXPECT_THAT(without("helpers.py", "LSTM"), HasSubstr("(TorchScript of another kind; needs libtorch)"));
-  EXPECT_THAT(without("rnn.py", "= 1", "= 2"),
-              HasSubstr("'policy.pt': TorchScript: expected a PolicyExporterLSTM with one LSTM layer and ELU between "
-                        "linear layers, found no line 'num_layers : Final[int] = 1' (TorchScript of another kind; "
-                        "needs libtorch)"));
-  EXPECT_THAT(without("rnn.py", "False", "True"), HasSubstr("found no line 'bidirectional : Final[bool] = False'"));
-  EXPECT_THAT(without("activation.py", "1.", "0.5"), HasSubstr("found no line 'alpha : Final[float] = 1.'"));
-  EXPECT_THAT(without("container.py", "ELU", "Tanh"), HasSubstr("found 'activation.Tanh' as module 1 of its actor"));
-  EXPECT_THAT(without("container.py", "ELU", "GELU"), HasSubstr("found 'activation.GELU' as module 1"));
-  EXPECT_THAT(without("container.py", "[\"2\"]", "[\"4\"]"), HasSubstr("found no module 2 in its actor"));
+  EXPECT_SENTENCE(without("helpers.py", "LSTM"));
+  EXPECT_SENTENCE(without("rnn.py", "= 1", "= 2"));
+  EXPECT_SENTENCE(without("rnn.py", "False", "True"));
+  EXPECT_SENTENCE(without("activation.py", "1.", "0.5"));
+  EXPECT_SENTENCE(without("container.py", "ELU", "Tanh"));
+  EXPECT_SENTENCE(without("container.py", "ELU", "GELU"));
+  EXPECT_SENTENCE(without("container.py", "[\"2\"]", "[\"4\"]"));
   Export longer;
   longer.code["container.py"] += "  __annotations__[\"3\"] = __torch__.torch.nn.modules.activation.Tanh\n";
-  EXPECT_THAT(longer.refusal(), HasSubstr("found more than 3 modules in its actor"));
+  EXPECT_SENTENCE(longer.refusal());
   Export wide;
   wide.pickle = "ctorch\nDoubleStorage\n";
-  EXPECT_THAT(wide.refusal(), HasSubstr("found tensors that are not float"));
+  EXPECT_SENTENCE(wide.refusal());
 }
 
 TEST(TorchScript, TensorsThatDoNotFitAreRefused) {
@@ -162,32 +156,32 @@ TEST(TorchScript, TensorsThatDoNotFitAreRefused) {
     file.tensors[tensor] = operand(shape);
     return file.refusal();
   };
-  EXPECT_THAT(changed(1, {3}), HasSubstr("tensor 'data/1': its 3 numbers do not fit the other tensors"));
-  EXPECT_THAT(changed(2, {11}), HasSubstr("tensor 'data/2'"));
-  EXPECT_THAT(changed(4, {7}), HasSubstr("tensor 'data/4'"));
-  EXPECT_THAT(changed(6, {81}), HasSubstr("tensor 'data/6'"));
-  EXPECT_THAT(changed(7, {63}), HasSubstr("tensor 'data/7'"));
-  EXPECT_THAT(changed(9, {15}), HasSubstr("tensor 'data/9'"));
+  EXPECT_SENTENCE(changed(1, {3}));
+  EXPECT_SENTENCE(changed(2, {11}));
+  EXPECT_SENTENCE(changed(4, {7}));
+  EXPECT_SENTENCE(changed(6, {81}));
+  EXPECT_SENTENCE(changed(7, {63}));
+  EXPECT_SENTENCE(changed(9, {15}));
   Export few;
   few.tensors.resize(7);
-  EXPECT_THAT(few.refusal(), HasSubstr("expected tensors 0 to 2 n + 5, found 7 tensors"));
+  EXPECT_SENTENCE(few.refusal());
   Export spoiled;
   spoiled.tensors[7].values[3] = std::nanf("");
-  EXPECT_THAT(spoiled.refusal(), HasSubstr("tensor 'data/7': expected finite numbers, found nan"));
+  EXPECT_SENTENCE(spoiled.refusal());
 }
 
 TEST(TorchScript, ArchivesThatAreNotOnesAreRefused) {
   Export empty;
   empty.pickle.clear();
-  EXPECT_THAT(empty.refusal(), HasSubstr("expected an entry 'data.pkl', found none"));
+  EXPECT_SENTENCE(empty.refusal());
   Export big;
   big.byteorder = "big";
-  EXPECT_THAT(big.refusal(), HasSubstr("expected little-endian numbers"));
+  EXPECT_SENTENCE(big.refusal());
   const auto refusal = [](const std::vector<ZipEntry>& entries) {
     return thrown_message<InputError>([&] { (void)torch_script_network(zip_bytes(entries), "policy.pt"); });
   };
-  EXPECT_THAT(refusal({{"p/data/x1", ""}}), HasSubstr("expected tensors numbered from 0, found 'data/x1'"));
-  EXPECT_THAT(refusal({{"p/data/0", "123"}}), HasSubstr("expected 4 bytes a number, found 3 bytes"));
+  EXPECT_SENTENCE(refusal({{"p/data/x1", ""}}));
+  EXPECT_SENTENCE(refusal({{"p/data/0", "123"}}));
 }
 
 }  // namespace

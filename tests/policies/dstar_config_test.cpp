@@ -47,10 +47,8 @@ TEST(DstarConfig, RefusesOtherFieldsAndValues) {
   const std::string start = "net: configuration of D-STAR: ";
   EXPECT_EQ(thrown_message<InputError>([] { parse_dstar_config("[1]", "net"); }),
             start + "expected a JSON object, found array");
-  EXPECT_THAT(thrown_message<InputError>([] { parse_dstar_config("{", "net"); }),
-              StartsWith(start + "not valid JSON: parse error at line 1"));
-  EXPECT_THAT(refusal("widht", 3),
-              StartsWith(start + "unknown field 'widht': did you mean 'width'? Nearest of 30: width"));
+  EXPECT_SENTENCE(thrown_message<InputError>([] { parse_dstar_config("{", "net"); }));
+  EXPECT_SENTENCE(refusal("widht", 3));
   EXPECT_EQ(refusal("width", {}), start + "expected a field 'width', found none");
   EXPECT_EQ(refusal("short_stream", {}), start + "expected a field 'short_stream', found none");
   EXPECT_EQ(refusal("width", 0), start + "'width': expected a whole number from 1 to 8192, found 0");
@@ -89,11 +87,8 @@ TEST(Diffusion, InferenceGoesFromTheLastStepToTheFirst) {
 }
 
 TEST(Diffusion, RefusesNoStepsAndMoreThanThereAre) {
-  EXPECT_EQ(thrown_message<std::invalid_argument>([] { squared_cosine_alpha_bar(0); }),
-            "squared_cosine_alpha_bar: expected at least one step");
-  for (const int steps : {0, 6})
-    EXPECT_EQ(thrown_message<std::invalid_argument>([&] { ddim_steps(5, steps); }),
-              "ddim_steps: expected from one step of inference to as many as of training");
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { squared_cosine_alpha_bar(0); }));
+  for (const int steps : {0, 6}) EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { ddim_steps(5, steps); }));
 }
 
 }  // namespace

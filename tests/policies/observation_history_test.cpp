@@ -35,10 +35,8 @@ TEST(ObservationHistory, ForgetsOnReset) {
 
 TEST(ObservationHistory, RefusesToBeAskedBeforeTheFirstFrame) {
   const ObservationHistory history;
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([&] { (void)history.at(0); }),
-            "observation history: no frame was added yet");
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] { to_matrix({}, {}); }),
-            "observation: expected a history, found none");
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { (void)history.at(0); }));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { to_matrix({}, {}); }));
 }
 
 TEST(ObservationHistory, BecomesOneColumnPerFrame) {

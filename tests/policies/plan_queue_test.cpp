@@ -1,7 +1,5 @@
 #include "duet/policies/plan_queue.h"
 
-#include <gmock/gmock.h>
-
 #include <atomic>
 #include <limits>
 #include <thread>
@@ -15,7 +13,6 @@ namespace {
 
 using test::g1;
 using test::thrown_message;
-using ::testing::HasSubstr;
 
 constexpr double kLong = 30.0;  // [s] that nothing here takes
 
@@ -177,7 +174,7 @@ TEST(PlanQueue, LeavesOutAPlanThatIsNotFiniteAndSaysWhere) {
   EXPECT_TRUE(asked.plan.empty());
   EXPECT_EQ(asked.faults.invalid, 1);
   EXPECT_FALSE(asked.faults.dead);
-  EXPECT_EQ(asked.faults.message, "policy 'mine': tick 0: plan: row 1, number 2: expected a finite number, found nan");
+  EXPECT_SENTENCE(asked.faults.message);
 }
 
 TEST(PlanQueue, LeavesOutAPlanWithoutADirection) {
@@ -187,14 +184,14 @@ TEST(PlanQueue, LeavesOutAPlanWithoutADirection) {
     queue.answer(request, numbers, kAnchors);
   });
   EXPECT_TRUE(asked.plan.empty());
-  EXPECT_THAT(asked.faults.message, HasSubstr("row 0: expected a unit quaternion, found one of length 0"));
+  EXPECT_SENTENCE(asked.faults.message);
 }
 
 TEST(PlanQueue, RefusesAPlanOfAnotherShape) {
   ask_once([](PlanQueue& queue, const PlanRequest& request) {
     const std::string message =
         thrown_message<std::invalid_argument>([&] { queue.answer(request, numbers_at(0.8, 3), 3); });
-    EXPECT_EQ(message, "policy 'mine': plan: expected (5, 36) or (100, 36) numbers, found 3 rows and 108 numbers");
+    EXPECT_SENTENCE(message);
   });
 }
 
@@ -203,7 +200,7 @@ TEST(PlanQueue, AnEpisodeThatIsRefusedEndsWithTheReason) {
       [](PlanQueue& queue, const PlanRequest& request) { queue.refuse(request, "ValueError: no such partner"); });
   EXPECT_TRUE(asked.plan.empty());
   EXPECT_TRUE(asked.faults.dead);
-  EXPECT_EQ(asked.faults.message, "policy 'mine': tick 0: ValueError: no such partner");
+  EXPECT_SENTENCE(asked.faults.message);
 }
 
 TEST(PlanQueue, EpisodesOutliveACallerWhoDoesNotComeBack) {
@@ -213,8 +210,7 @@ TEST(PlanQueue, EpisodesOutliveACallerWhoDoesNotComeBack) {
   EXPECT_TRUE(first.ask().empty());
   taker.join();
   EXPECT_TRUE(first.policy->faults().dead);
-  EXPECT_EQ(first.policy->faults().message,
-            "policy 'mine': tick 0: no plan within 0.05 s: its function has not come back");
+  EXPECT_SENTENCE(first.policy->faults().message);
   const AskingEpisode later(queue->maker(g1()), 0.0);
   EXPECT_TRUE(later.ask().empty());
   EXPECT_TRUE(later.policy->faults().dead);
@@ -236,23 +232,20 @@ TEST(PlanQueue, NobodyWaitsAtAClosedQueue) {
   queue->close("the caller has gone");
   EXPECT_TRUE(queue->closed());
   EXPECT_TRUE(episode.ask().empty());
-  EXPECT_EQ(episode.policy->faults().message, "policy 'mine': tick 0: the caller has gone");
+  EXPECT_SENTENCE(episode.policy->faults().message);
   EXPECT_TRUE(queue->take(kLong).empty());
 }
 
 TEST(PlanQueue, IsOfOneRobot) {
   const std::shared_ptr<PlanQueue> queue = queue_of(1.0);
   static_cast<void>(queue->maker(g1()));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { static_cast<void>(queue->maker(test::t1())); }),
-              HasSubstr("policy 'mine': expected the joints of robot 'g1', found those of 't1'"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { static_cast<void>(queue->maker(test::t1())); }));
   EXPECT_EQ(queue->robot(), g1());
 }
 
 TEST(PlanQueue, RefusesOptionsOutOfRange) {
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { static_cast<void>(queue_of(0.0)); }),
-              HasSubstr("share: expected a number in (0, 1], found 0"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { static_cast<void>(queue_of(0.5, -1.0)); }),
-              HasSubstr("patience: expected 0 s or more, found -1"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { static_cast<void>(queue_of(0.0)); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { static_cast<void>(queue_of(0.5, -1.0)); }));
 }
 
 }  // namespace
