@@ -1,7 +1,5 @@
 #include "duet/statistics/sequential_test.h"
 
-#include <gmock/gmock.h>
-
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -14,7 +12,6 @@ namespace duet {
 namespace {
 
 using test::thrown_message;
-using testing::HasSubstr;
 
 // Difference of one pair: A alone succeeds, B alone, or neither nor both.
 double pair(Random& random, double only_a, double only_b) {
@@ -157,15 +154,10 @@ TEST(SequentialTest, PKeepsTheLargestEvidence) {
 
 TEST(SequentialTest, RefusesWhatIsNoDifference) {
   SequentialTest test;
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] {
-                test.add_round(std::vector<double>{0.0, 1.5});
-              }),
-              HasSubstr("expected a difference in [-1, 1], found 1.5"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { test.add_round(std::vector<double>{0.0, 1.5}); }));
   EXPECT_EQ(test.observations(), 0);
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { static_cast<void>(test.interval(1.0)); }),
-              HasSubstr("alpha: expected a number in (0, 1), found 1"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { static_cast<void>(test.log_capital(-1.0, true)); }),
-              HasSubstr("expected a mean in (-1, 1), found -1"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { static_cast<void>(test.interval(1.0)); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { static_cast<void>(test.log_capital(-1.0, true)); }));
 }
 
 TEST(SequentialDecision, IsReadFromTheInterval) {
@@ -181,10 +173,7 @@ TEST(SequentialDecision, IsReadFromTheInterval) {
   EXPECT_EQ(to_string(SequentialDecision::kWorse), "worse");
   EXPECT_EQ(to_string(SequentialDecision::kSame), "same within the margin");
   EXPECT_EQ(to_string(SequentialDecision::kUndecided), "undecided");
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
-                verdict_of({0.0, 0.0}, 0.0);
-              }),
-              HasSubstr("margin: expected a number in (0, 1), found 0"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { verdict_of({0.0, 0.0}, 0.0); }));
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "duet/statistics/statistics.h"
 
-#include <gmock/gmock.h>
-
 #include <array>
 #include <cmath>
 #include <numeric>
@@ -14,7 +12,6 @@ namespace duet {
 namespace {
 
 using test::thrown_message;
-using testing::HasSubstr;
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
@@ -43,8 +40,7 @@ TEST(NormalQuantile, IsOddAboutTheMedian) {
 
 TEST(NormalQuantile, RefusesTheEnds) {
   for (const double p : {0.0, 1.0, -0.1, std::nan("")}) {
-    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { normal_quantile(p); }),
-                testing::HasSubstr("expected p in (0, 1)"));
+    EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { normal_quantile(p); }));
   }
 }
 
@@ -87,9 +83,9 @@ TEST(Wilson, EndsAndEmpty) {
 }
 
 TEST(Wilson, RefusesWhatIsNoCount) {
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { wilson(3, 2); }), testing::HasSubstr("found k = 3, n = 2"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { wilson(-1, 2); }), testing::HasSubstr("found k = -1, n = 2"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { wilson(1, 2, 1.0); }), testing::HasSubstr("level"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { wilson(3, 2); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { wilson(-1, 2); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { wilson(1, 2, 1.0); }));
 }
 
 TEST(Wilson, CoversAtAboutItsLevel) {
@@ -137,8 +133,7 @@ TEST(NewcombePaired, SwappingTheArmsMirrorsTheInterval) {
 TEST(NewcombePaired, WithoutPairsSaysNothing) {
   EXPECT_EQ(newcombe_paired(0, 0, 0, 0).low, -1.0);
   EXPECT_EQ(newcombe_paired(0, 0, 0, 0).high, 1.0);
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { newcombe_paired(1, -2, 0, 0); }),
-              testing::HasSubstr("found 1, -2, 0, 0"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { newcombe_paired(1, -2, 0, 0); }));
 }
 
 // Twice the smaller tail over all 2^n ways in which the discordant pairs could have fallen.
@@ -171,8 +166,7 @@ TEST(McNemar, MatchesPublishedValuesAndLaws) {
   EXPECT_EQ(mcnemar_exact(30, 11), mcnemar_exact(11, 30));
   // Far past where 2^-n underflows: the normal approximation with continuity correction agrees.
   EXPECT_NEAR(mcnemar_exact(5100, 4900), std::erfc(199.0 / 100.0 / std::sqrt(2.0)), 1e-4);
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { mcnemar_exact(-1, 0); }),
-              testing::HasSubstr("found -1 and 0"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { mcnemar_exact(-1, 0); }));
 }
 
 TEST(ClusterBootstrap, SharedDrawsChangeNothing) {
@@ -248,9 +242,9 @@ TEST(ClusterBootstrap, RefusesWrongShapes) {
   const auto message = [](std::vector<double> values, std::vector<int> ids, int resamples) {
     return thrown_message<std::invalid_argument>([&] { cluster_bootstrap(values, ids, resamples, 1); });
   };
-  EXPECT_THAT(message({}, {}, 10), testing::HasSubstr("at least one value"));
-  EXPECT_THAT(message({1, 2}, {0}, 10), testing::HasSubstr("found 1 for 2"));
-  EXPECT_THAT(message({1}, {0}, 0), testing::HasSubstr("at least 1 resample"));
+  EXPECT_SENTENCE(message({}, {}, 10));
+  EXPECT_SENTENCE(message({1, 2}, {0}, 10));
+  EXPECT_SENTENCE(message({1}, {0}, 0));
 }
 
 TEST(Holm, TextbookExample) {
@@ -266,12 +260,8 @@ TEST(Holm, Laws) {
   EXPECT_EQ(holm(std::vector<double>{0.2}), std::vector<double>{0.2});
   EXPECT_EQ(holm(std::vector<double>{0.9, 0.8}), (std::vector<double>{1.0, 1.0}));
   EXPECT_EQ(holm(std::vector<double>{0.1, 0.1, 0.1}), (std::vector<double>(3, 3 * 0.1)));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
-                holm(std::vector<double>{0.1, 1.5});
-              }),
-              testing::HasSubstr("1.5"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { holm(std::vector<double>{std::nan("")}); }),
-              testing::HasSubstr("nan"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { holm(std::vector<double>{0.1, 1.5}); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { holm(std::vector<double>{std::nan("")}); }));
 }
 
 TEST(MinimumDetectableDifference, MatchesTheReferenceFigures) {
@@ -284,14 +274,10 @@ TEST(MinimumDetectableDifference, FallsWithNAndStaysUsableAtTheEnds) {
   EXPECT_NEAR(minimum_detectable_difference(0.0, 126), minimum_detectable_difference(1.0, 126), 1e-15);
   EXPECT_GT(minimum_detectable_difference(1.0, 126), 0.03);
   EXPECT_EQ(minimum_detectable_difference(0.5, 1), 1.0);
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { minimum_detectable_difference(0.5, 0); }),
-              testing::HasSubstr("found 0"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { minimum_detectable_difference(1.5, 9); }),
-              testing::HasSubstr("1.5"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { minimum_detectable_difference(0.5, 9, 0.0); }),
-              testing::HasSubstr("alpha"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { minimum_detectable_difference(0.5, 9, 0.05, 1.0); }),
-              testing::HasSubstr("power"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { minimum_detectable_difference(0.5, 0); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { minimum_detectable_difference(1.5, 9); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { minimum_detectable_difference(0.5, 9, 0.0); }));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { minimum_detectable_difference(0.5, 9, 0.05, 1.0); }));
 }
 
 TEST(MinimumDetectableDifferencePaired, SolvesConnorsEquation) {
@@ -313,8 +299,7 @@ TEST(MinimumDetectableDifferencePaired, WithoutDiscordanceIsTheOneSidedLimit) {
   EXPECT_NEAR(std::sqrt(126 * d), za + zb * std::sqrt(1.0 - d), 1e-9);
   EXPECT_NEAR(d, 0.061, 1e-3);
   EXPECT_EQ(minimum_detectable_difference_paired(0.5, 3), 1.0);
-  EXPECT_THAT(thrown_message<std::invalid_argument>([] { minimum_detectable_difference_paired(-0.1, 9); }),
-              testing::HasSubstr("discordance"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { minimum_detectable_difference_paired(-0.1, 9); }));
 }
 
 // A difference of the size that was promised is found in about 80 % of simulated runs.
@@ -356,8 +341,8 @@ TEST(ClusterBootstrap, RatioRefusesDivisorsThatAreNotAboveZero) {
   const auto message = [&](const std::vector<double>& below) {
     return thrown_message<std::invalid_argument>([&] { ClusterBootstrap(10, 1).ratio(above, below, clusters); });
   };
-  EXPECT_THAT(message({1.0, 0.0}), HasSubstr("expected divisors above 0"));
-  EXPECT_THAT(message({1.0}), HasSubstr("expected one divisor per value, found 1 for 2"));
+  EXPECT_SENTENCE(message({1.0, 0.0}));
+  EXPECT_SENTENCE(message({1.0}));
 }
 
 TEST(ClusterBootstrap, WeightedMedianIsDrawnByCluster) {
@@ -402,9 +387,8 @@ TEST(ClusterBootstrap, WeightedMedianIsThatOfEachDraw) {
 }
 
 TEST(ClusterBootstrap, WeightedMedianRefusesWeightsThatAreNotAboveZero) {
-  EXPECT_THAT(thrown_message<std::invalid_argument>(
-                  [] { ClusterBootstrap(10, 1).weighted_median(std::vector{1.0}, std::vector{0.0}, std::vector{0}); }),
-              HasSubstr("expected weights above 0"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>(
+      [] { ClusterBootstrap(10, 1).weighted_median(std::vector{1.0}, std::vector{0.0}, std::vector{0}); }));
 }
 
 }  // namespace
