@@ -1,7 +1,6 @@
 #include "duet/formats/pickle_output.h"
 
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 
 #include <cstdlib>
 
@@ -15,8 +14,6 @@
 
 namespace duet {
 namespace {
-
-using ::testing::HasSubstr;
 
 std::string sample() {
   PickleOutput out;
@@ -111,10 +108,7 @@ assert np.allclose(np.abs(m['pose_aa'][:, 1:]).sum(-1), np.abs(m['dof'])) and m[
 
 TEST(PickleOutput, AnArrayThatDoesNotFitItsShapeIsRefused) {
   PickleOutput out;
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] {
-                out.array({2, 2}, std::vector<double>{1.0});
-              }),
-              HasSubstr("shape and number of values disagree"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { out.array({2, 2}, std::vector<double>{1.0}); }));
 }
 
 }  // namespace
