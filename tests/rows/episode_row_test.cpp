@@ -100,12 +100,10 @@ TEST(EpisodeRow, FaultsAndTimesOfPoliciesAreReadStrictly) {
     json[object][key] = std::move(value);
     return refusal(json);
   };
-  EXPECT_THAT(with("policy_faults", "late", -1), HasSubstr("policy_faults: key 'late': expected a whole number"));
-  EXPECT_THAT(with("policy_faults", "dead", 1), HasSubstr("policy_faults: key 'dead': expected true or false"));
-  EXPECT_THAT(with("policy_faults", "message", 1), HasSubstr("policy_faults: key 'message'"));
-  EXPECT_THAT(with("policy_faults", "lat", 1), HasSubstr("policy_faults: unknown key 'lat'"));
-  EXPECT_THAT(with("policy_ms", "max", "1"), HasSubstr("policy_ms: key 'max': expected a number or null"));
-  EXPECT_THAT(with("policy_ms", "p5", 1), HasSubstr("policy_ms: unknown key 'p5'"));
+  EXPECT_SENTENCE(with("policy_faults", "late", -1));
+  for (const char* text : {"dead", "message", "lat"}) EXPECT_SENTENCE(with("policy_faults", text, 1));
+  EXPECT_SENTENCE(with("policy_ms", "max", "1"));
+  EXPECT_SENTENCE(with("policy_ms", "p5", 1));
   EpisodeRow row = full_row();
   row.policy_ms = {};
   EXPECT_TRUE(to_json(row).at("policy_ms").at("max").is_null());
@@ -125,17 +123,15 @@ TEST(EpisodeRow, FeetAndFaultsAreReadStrictly) {
     json[object][key] = std::move(value);
     return refusal(json);
   };
-  EXPECT_EQ(with("feet", "left_mm", {1, 2}),
-            "episode row: feet: expected as many heights of both feet, found 2 of the left and 3 of the right");
-  EXPECT_THAT(with("feet", "right_mm", {1, 2, 0.5}),
-              HasSubstr("episode row: feet: key 'right_mm': expected a list of whole numbers"));
-  EXPECT_THAT(with("feet", "rate_hz", 0), HasSubstr("key 'rate_hz': expected a number above 0, found 0"));
-  EXPECT_THAT(with("feet", "left", 0), HasSubstr("feet: unknown key 'left'"));
-  EXPECT_THAT(with("faults", "actions", -1), HasSubstr("faults: key 'actions': expected a whole number of at least 0"));
-  EXPECT_THAT(with("faults", "stopped", 1), HasSubstr("faults: key 'stopped': expected true or false"));
+  EXPECT_SENTENCE(with("feet", "left_mm", {1, 2}));
+  EXPECT_SENTENCE(with("feet", "right_mm", {1, 2, 0.5}));
+  EXPECT_SENTENCE(with("feet", "rate_hz", 0));
+  EXPECT_SENTENCE(with("feet", "left", 0));
+  EXPECT_SENTENCE(with("faults", "actions", -1));
+  EXPECT_SENTENCE(with("faults", "stopped", 1));
   EpisodeRow row = full_row();
   row.feet.left_mm.pop_back();
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { to_json(row); }), HasSubstr("feet: expected as many"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { to_json(row); }));
   row.feet = {};
   EXPECT_TRUE(to_json(row).at("feet").is_null());
 }
@@ -146,9 +142,9 @@ TEST(EpisodeRow, ContactsAreReadStrictly) {
     json["contacts"][0][key] = std::move(value);
     return refusal(json);
   };
-  EXPECT_EQ(with("peak_n", "81"), "episode row: contact 0: key 'peak_n': expected a number or null, found \"81\"");
-  EXPECT_EQ(with("link", 3), "episode row: contact 0: key 'link': expected a string, found 3");
-  EXPECT_THAT(with("peak", 3), HasSubstr("contact 0: unknown key 'peak': did you mean 'peak_n'?"));
+  EXPECT_SENTENCE(with("peak_n", "81"));
+  EXPECT_SENTENCE(with("link", 3));
+  EXPECT_SENTENCE(with("peak", 3));
   const nlohmann::json whole = to_json(full_row());
   for (const auto& [key, value] : whole.at("contacts").at(0).items()) {
     nlohmann::json json = whole;
@@ -171,19 +167,18 @@ TEST(EpisodeRow, ATraceHasThreeWholeNumbersForEachPoint) {
     return refusal(json);
   };
   using Json = nlohmann::json;
-  EXPECT_EQ(with("mm", Json::array({{0, 0, 0, 0, 0, 0}, {1, 2, 3}})),
-            "episode row: trace: key 'mm': frame 1: expected 6 whole numbers (3 for each of 2 points), found 3");
-  EXPECT_THAT(with("mm", Json::array({{0, 0, 0, 0, 0, 0.5}})), HasSubstr("frame 0: expected a list of whole numbers"));
-  EXPECT_THAT(with("mm", Json::array({{0, 0, 0, 0, 0, 3000000000}})), HasSubstr("frame 0: expected a list of whole"));
-  EXPECT_THAT(with("mm", Json::array()), HasSubstr("key 'mm': expected a list of frames"));
-  EXPECT_THAT(with("mm", 3), HasSubstr("key 'mm': expected a list of frames"));
-  EXPECT_THAT(with("points", {"root", "root"}), HasSubstr("key 'points': expected at least one name, each once"));
-  EXPECT_THAT(with("points", {"root", 1}), HasSubstr("key 'points': expected a list of names"));
-  EXPECT_THAT(with("rate_hz", 0), HasSubstr("key 'rate_hz': expected a number above 0, found 0"));
-  EXPECT_THAT(with("rat_hz", 10), HasSubstr("trace: unknown key 'rat_hz': did you mean 'rate_hz'?"));
+  EXPECT_SENTENCE(with("mm", Json::array({{0, 0, 0, 0, 0, 0}, {1, 2, 3}})));
+  EXPECT_SENTENCE(with("mm", Json::array({{0, 0, 0, 0, 0, 0.5}})));
+  EXPECT_SENTENCE(with("mm", Json::array({{0, 0, 0, 0, 0, 3000000000}})));
+  EXPECT_SENTENCE(with("mm", Json::array()));
+  EXPECT_SENTENCE(with("mm", 3));
+  EXPECT_SENTENCE(with("points", {"root", "root"}));
+  EXPECT_SENTENCE(with("points", {"root", 1}));
+  EXPECT_SENTENCE(with("rate_hz", 0));
+  EXPECT_SENTENCE(with("rat_hz", 10));
   EpisodeRow row = full_row();
   row.trace.mm[1].pop_back();
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { to_json(row); }), HasSubstr("frame 1: expected 6"));
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>([&] { to_json(row); }));
 }
 
 TEST(EpisodeRow, NoVerdictIsNotFailure) {
@@ -244,10 +239,10 @@ TEST(EpisodeRow, EveryKeyHasItsType) {
 TEST(EpisodeRow, UnknownKeysAreRefusedWithTheNearest) {
   nlohmann::json json = to_json(full_row());
   json["enginee"] = "mujoco";
-  EXPECT_THAT(refusal(json), HasSubstr("unknown key 'enginee': did you mean 'engine'?"));
+  EXPECT_SENTENCE(refusal(json));
   json = to_json(full_row());
   json["verdicts"][0]["sucess"] = true;
-  EXPECT_THAT(refusal(json), HasSubstr("verdict 0: unknown key 'sucess'"));
+  EXPECT_SENTENCE(refusal(json));
 }
 
 TEST(EpisodeRow, WrongValuesAreNamed) {
@@ -256,23 +251,22 @@ TEST(EpisodeRow, WrongValuesAreNamed) {
     json[key] = std::move(value);
     return refusal(json);
   };
-  EXPECT_THAT(with("schema", 4), HasSubstr("expected schema 5, found 4"));
-  EXPECT_THAT(with("key", ""), HasSubstr("key 'key'"));
-  EXPECT_THAT(with("episode", -1), HasSubstr("key 'episode': expected a whole number of at least 0, found -1"));
-  EXPECT_THAT(with("episode", 1.5), HasSubstr("key 'episode': expected a whole number, found 1.5"));
-  EXPECT_THAT(with("seed", -3), HasSubstr("key 'seed'"));
-  EXPECT_THAT(with("arm", "nul"), HasSubstr("unknown arm 'nul': did you mean 'null'?"));
-  EXPECT_THAT(with("outcome", "exploded"), HasSubstr("key 'outcome'"));
-  EXPECT_THAT(with("success", "yes"), HasSubstr("key 'success': expected true or false, found \"yes\""));
-  EXPECT_THAT(with("metrics", {{"jpe", nullptr}}), HasSubstr("key 'metrics.jpe': expected a number, found null"));
-  EXPECT_THAT(with("forces", {{"ground.peak_n", nullptr}}),
-              HasSubstr("key 'forces.ground.peak_n': expected a number, found null"));
-  EXPECT_THAT(with("contacts", 2), HasSubstr("key 'contacts': expected a list, found number"));
-  EXPECT_THAT(with("contacts_total", -1), HasSubstr("key 'contacts_total': expected a whole number of at least 0"));
-  EXPECT_THAT(with("engine_profile", 2), HasSubstr("key 'engine_profile': expected a string, found 2"));
-  EXPECT_THAT(with("sim_s", "5"), HasSubstr("key 'sim_s': expected a number or null"));
-  EXPECT_THAT(with("verdicts", {{"paper", 1}}), HasSubstr("expected a list, found object"));
-  EXPECT_EQ(refusal(nlohmann::json::array()), "episode row: expected an object, found array");
+  EXPECT_SENTENCE(with("schema", 4));
+  EXPECT_SENTENCE(with("key", ""));
+  EXPECT_SENTENCE(with("episode", -1));
+  EXPECT_SENTENCE(with("episode", 1.5));
+  EXPECT_SENTENCE(with("seed", -3));
+  EXPECT_SENTENCE(with("arm", "nul"));
+  EXPECT_SENTENCE(with("outcome", "exploded"));
+  EXPECT_SENTENCE(with("success", "yes"));
+  EXPECT_SENTENCE(with("metrics", {{"jpe", nullptr}}));
+  EXPECT_SENTENCE(with("forces", {{"ground.peak_n", nullptr}}));
+  EXPECT_SENTENCE(with("contacts", 2));
+  EXPECT_SENTENCE(with("contacts_total", -1));
+  EXPECT_SENTENCE(with("engine_profile", 2));
+  EXPECT_SENTENCE(with("sim_s", "5"));
+  EXPECT_SENTENCE(with("verdicts", {{"paper", 1}}));
+  EXPECT_SENTENCE(refusal(nlohmann::json::array()));
 }
 
 TEST(EpisodeKey, IsOfWhatTheEpisodeIsAndOfNothingElse) {

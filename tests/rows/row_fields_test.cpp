@@ -8,6 +8,7 @@
 #include "duet/rows/json_fields.h"
 #include "duet/rows/row_file.h"
 #include "tests/rows/rows.h"
+#include "tests/support.h"
 
 namespace duet {
 namespace {

@@ -4,6 +4,7 @@
 
 #include "duet/rows/row_file.h"
 #include "tests/rows/rows.h"
+#include "tests/support.h"
 
 namespace duet {
 namespace {
@@ -106,8 +107,7 @@ TEST(RowIdentity, TheTextNamesTheFirstFewWithBothValues) {
   const std::vector<FieldDifference> differences = row_differences(full_row(), row);
   const std::string text = differences_text(differences);
   EXPECT_LT(text.find("success: "), text.find("metrics.jpe: "));
-  EXPECT_THAT(text, testing::HasSubstr("success: true, false"));
-  EXPECT_THAT(text, testing::HasSubstr("metrics.jpe: 0.30000000000000004, nothing"));
+  EXPECT_SENTENCE(text);
   EXPECT_THAT(text, testing::HasSubstr("xxx..."));
   EXPECT_EQ(differences_text(std::vector<FieldDifference>(7, {"a", "1", "2"})),
             "a: 1, 2; a: 1, 2; a: 1, 2; a: 1, 2; a: 1, 2; 2 more");
