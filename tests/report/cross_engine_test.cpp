@@ -17,7 +17,6 @@ namespace {
 using test::engine_episode;
 using test::thrown_message;
 using test::traced;
-using testing::HasSubstr;
 
 using Rows = std::vector<EpisodeRow>;
 
@@ -171,10 +170,9 @@ TEST(CrossEngineComparison, FewerThanTwoPhysicsEnginesHaveNoTables) {
 TEST(CrossEngineComparison, RefusesMixedSuitesAndEpisodesThatAreThereTwice) {
   Rows rows = {engine_episode("mujoco", "replay", 0, true), engine_episode("ode", "replay", 0, true)};
   rows[1].suite_version = "2.0.0";
-  EXPECT_THAT(thrown_message<InputError>([&] { compared(rows); }), HasSubstr("tiny@2.0.0"));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { compared(rows); }));
   rows[1] = rows[0];
-  EXPECT_THAT(thrown_message<InputError>([&] { compared(rows); }),
-              HasSubstr("the episode hug hug-0 0 of mujoco/vmc/replay clean (main arm) is there twice"));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { compared(rows); }));
 }
 
 Estimate rank_of(const Estimates& ranks, const char* of, const char* engines, const char* name) {
@@ -252,9 +250,8 @@ TEST(RankStability, MeanMaximumRankViolationIsThatOfSimpler) {
   // Tied in the other engine: an item is violated by those above it in the reference alone.
   EXPECT_NEAR(mean_maximum_rank_violation(reference, std::vector<double>{0.1, 0.1, 0.1}), 0.7 / 3.0, 1e-12);
   EXPECT_EQ(mean_maximum_rank_violation(std::vector<double>{0.5, 0.5}, std::vector<double>{0.2, 0.7}), 0.0);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
-                  [&] { mean_maximum_rank_violation(reference, std::vector<double>{0.1}); }),
-              testing::HasSubstr("expected as many rates in both engines"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>(
+      [&] { mean_maximum_rank_violation(reference, std::vector<double>{0.1}); }));
 }
 
 TEST(RankStability, TheWinnerChangesWhereTheBestAreNotTheSame) {
@@ -265,8 +262,7 @@ TEST(RankStability, TheWinnerChangesWhereTheBestAreNotTheSame) {
   EXPECT_EQ(winner_change(first, std::vector<double>{0.5, 0.5}), 0.0);
   EXPECT_EQ(winner_change(std::vector<double>{0.5, 0.5}, std::vector<double>{0.5, 0.5}), 0.0);
   EXPECT_EQ(winner_change(std::vector<double>{0.9, 0.9, 0.1}, std::vector<double>{0.2, 0.3, 0.4}), 1.0);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { winner_change(first, std::vector<double>{}); }),
-              testing::HasSubstr("winner: expected as many rates"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { winner_change(first, std::vector<double>{}); }));
 }
 
 TEST(RankStability, FiguresHaveIntervalsThatDrawClipsAgain) {
