@@ -93,9 +93,9 @@ TEST(BodyModel, JointsAreKeptBesideTheFileUntilItChanges) {
   const std::string path = folder / "SMPL_NEUTRAL.npz";
   SmallModel(24).npz().save(path);
   const BodyModel first = load_body_model(path);
-  EXPECT_THAT(first.note, HasSubstr("SMPL of 'SMPL_NEUTRAL.npz', 10 shape parameters"));
+  EXPECT_SENTENCE(first.note);
   const BodyModel again = load_body_model(path);
-  EXPECT_THAT(again.note, HasSubstr("joints kept beside it"));
+  EXPECT_SENTENCE(again.note);
   EXPECT_EQ(again.kind, "SMPL");
   EXPECT_LT((rest_joints(again, kBetas) - rest_joints(first, kBetas)).norm(), 1e-15);
   // The file that is kept is a shape basis for retargeting, and a model of its own.
@@ -113,7 +113,7 @@ TEST(BodyModel, AFolderThatTakesNoFileIsSaid) {
   SmallModel(24).npz().save(path);
   std::filesystem::create_directory(path + ".duet-joints.npz");  // also root cannot write a file there
   const BodyModel model = load_body_model(path);
-  EXPECT_THAT(model.note, HasSubstr("its joints are not kept: the folder takes no file"));
+  EXPECT_SENTENCE(model.note);
   EXPECT_EQ(model.kind, "SMPL");
 }
 
@@ -125,7 +125,7 @@ TEST(BodyModel, TheAveragePersonIsAPersonInTheModelsAxes) {
   EXPECT_GT(model.joints(1, kHead), 0.5);                                   // y: up
   EXPECT_GT(model.joints(2, kLeftToe) - model.joints(2, kLeftAnkle), 0.1);  // z: forward
   EXPECT_NEAR(model.joints(1, kHead) - model.joints(1, kLeftAnkle), 1.47, 0.05);
-  EXPECT_THAT(model.note, HasSubstr("no body model: an average skeleton of 1.70 m"));
+  EXPECT_SENTENCE(model.note);
   EXPECT_EQ(rest_joints(model, kBetas), model.joints);
 }
 
@@ -141,30 +141,23 @@ TEST(BodyModel, FaultsAreNamed) {
     npz.set(key, std::move(values), std::move(shape));
     return refusal(npz.bytes());
   };
-  EXPECT_THAT(thrown_message<InputError>([&] { (void)load_body_model(folder / "absent.npz"); }),
-              HasSubstr("absent.npz': No such file"));
-  EXPECT_THAT(refusal(""), HasSubstr("the file is empty"));
-  EXPECT_THAT(refusal(inter_x_npz(test::body_parameters(2, 1)).bytes()), HasSubstr("no array 'v_template'"));
-  EXPECT_THAT(refusal("\x80\x02}."), HasSubstr("expected a dict with the key 'v_template' of a body model"));
-  EXPECT_THAT(refusal("\x80\x02"
-                      "cchumpy.ch\nCh\n)\x81."),
-              HasSubstr("'chumpy.ch.Ch' is refused"));
-  EXPECT_THAT(refusal("\x80\x02"
-                      "cos\nsystem\n."),
-              HasSubstr("'os.system' is refused"));
-  EXPECT_THAT(with("J_regressor", std::vector<double>(20 * 48), {20, 48}),
-              HasSubstr("expected 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X) joints, found 20"));
-  EXPECT_THAT(with("J_regressor", std::vector<double>(24 * 47), {24, 47}),
-              HasSubstr("expected shape (joints, 48), found (24, 47)"));
-  EXPECT_THAT(with("J_regressor", std::vector<double>(24 * 48), {24, 48}),
-              HasSubstr("expected the joints of a person in metres, found 0 m"));
-  EXPECT_THAT(with("shapedirs", std::vector<double>(48 * 30), {48, 30}), HasSubstr("expected shape (48, 3, B)"));
-  EXPECT_THAT(with("v_template", std::vector<double>(48 * 3, NAN), {48, 3}),
-              HasSubstr("expected finite numbers, found nan at row 0"));
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { (void)load_body_model(folder / "absent.npz"); }));
+  EXPECT_SENTENCE(refusal(""));
+  EXPECT_SENTENCE(refusal(inter_x_npz(test::body_parameters(2, 1)).bytes()));
+  for (const char* text : {"\x80\x02}.",
+                           "\x80\x02"
+                           "cchumpy.ch\nCh\n)\x81.",
+                           "\x80\x02"
+                           "cos\nsystem\n."})
+    EXPECT_SENTENCE(refusal(text));
+  EXPECT_SENTENCE(with("J_regressor", std::vector<double>(20 * 48), {20, 48}));
+  EXPECT_SENTENCE(with("J_regressor", std::vector<double>(24 * 47), {24, 47}));
+  EXPECT_SENTENCE(with("J_regressor", std::vector<double>(24 * 48), {24, 48}));
+  EXPECT_SENTENCE(with("shapedirs", std::vector<double>(48 * 30), {48, 30}));
+  EXPECT_SENTENCE(with("v_template", std::vector<double>(48 * 3, NAN), {48, 3}));
   std::vector<double> one_is_none(48 * 3, 0.0);
   one_is_none[5 * 3 + 2] = NAN;
-  EXPECT_THAT(with("v_template", one_is_none, {48, 3}),
-              HasSubstr("expected finite numbers, found nan at row 5, number 2"));
+  EXPECT_SENTENCE(with("v_template", one_is_none, {48, 3}));
   const std::string good = small.pickle(SmallModel::Matrix::kColumns);
   for (std::size_t size = 0; size < good.size(); size += 97)
     EXPECT_THAT(refusal(good.substr(0, size)), HasSubstr("m.bin")) << size;
@@ -180,9 +173,9 @@ TEST(BodyModel, ASparseMatrixThatIsNoneIsRefused) {
     write_file(folder / "m.pkl", edited);
     return thrown_message<InputError>([&] { (void)load_body_model(folder / "m.pkl"); });
   };
-  EXPECT_THAT(refusal("_shape", '\x11', 7), HasSubstr("key 'J_regressor"));
-  EXPECT_THAT(refusal("_shape", 'x', 0), HasSubstr("expected a shape of two sizes"));
-  EXPECT_THAT(refusal("indptr", 'x', 0), HasSubstr("no member 'indptr'"));
+  EXPECT_SENTENCE(refusal("_shape", '\x11', 7));
+  EXPECT_SENTENCE(refusal("_shape", 'x', 0));
+  EXPECT_SENTENCE(refusal("indptr", 'x', 0));
 }
 
 }  // namespace

@@ -22,7 +22,6 @@ namespace duet {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
 
 const std::string kExamples = DUET_SOURCE_DIR "/examples/data";
 

@@ -70,35 +70,30 @@ TEST(TorchTensors, WhatDoesNotLieInTheStorageIsRefused) {
   const auto lie = [&](int first, const std::vector<int>& sizes, const std::vector<int>& strides) {
     return refusal(dict_of([&](TorchWriter& out) { out.tensor("DoubleStorage", six, 6, first, sizes, strides); }));
   };
-  EXPECT_THAT(lie(0, {2, 3}, {3, 2}), HasSubstr("a tensor of shape (2, 3) and strides (3, 2) from number 0 on does not "
-                                                "lie in a storage of 6 numbers"));
-  EXPECT_THAT(lie(6, {1}, {1}), HasSubstr("does not lie in a storage of 6 numbers"));
-  EXPECT_THAT(lie(0, {1 << 30, 1 << 30, 1 << 30}, {0, 0, 0}), HasSubstr("does not lie in"));
-  EXPECT_THAT(lie(0, {1 << 30}, {0}), HasSubstr("does not lie in"));
-  EXPECT_THAT(lie(0, {2}, {-1}), HasSubstr("strides of a torch tensor: -1 is out of range"));
-  EXPECT_THAT(lie(0, {2}, {1, 1}), HasSubstr("2 strides for 1 sizes"));
+  EXPECT_SENTENCE(lie(0, {2, 3}, {3, 2}));
+  EXPECT_SENTENCE(lie(6, {1}, {1}));
+  EXPECT_SENTENCE(lie(0, {1 << 30, 1 << 30, 1 << 30}, {0, 0, 0}));
+  EXPECT_SENTENCE(lie(0, {1 << 30}, {0}));
+  EXPECT_SENTENCE(lie(0, {2}, {-1}));
+  EXPECT_SENTENCE(lie(0, {2}, {1, 1}));
 }
 
 TEST(TorchTensors, OtherFilesAndNamesAreRefused) {
   const auto file = [](const std::string& bytes) {
     return thrown_message<InputError>([&] { (void)parse_torch(bytes, "x.pt"); });
   };
-  EXPECT_THAT(file(""), HasSubstr("'x.pt': empty, expected a zip archive"));
-  EXPECT_THAT(file("\x80\x02N."), HasSubstr("'x.pt': not a zip archive"));
-  EXPECT_THAT(file(zip_bytes({{"a/version", "3"}})), HasSubstr("'x.pt': expected an entry 'data.pkl'"));
-  EXPECT_THAT(file(zip_bytes({{"a/data.pkl", "\x80\x02N."}, {"a/byteorder", "big"}})), HasSubstr("little-endian"));
-  EXPECT_THAT(file(zip_bytes({{"a/data.pkl",
-                               "\x80\x02"
-                               "cos\nsystem\n."}})),
-              HasSubstr("'x.pt: data.pkl': byte 2: 'os.system' is refused"));
-  EXPECT_THAT(file(zip_bytes({{"a/data.pkl",
-                               "\x80\x02"
-                               "ctorch._utils\n_rebuild_tensor_v2\n)R."}})),
-              HasSubstr("a torch tensor: expected at least 4 items, found 0"));
-  EXPECT_THAT(refusal(dict_of([](TorchWriter& out) { out.tensor("QInt8Storage", "a", 1, 0, {1}, {1}); })),
-              HasSubstr("'torch.QInt8Storage' is refused"));
-  EXPECT_THAT(refusal(dict_of([](TorchWriter& out) { out.pickle.integer(3); })),
-              HasSubstr("tensor 'x': expected a torch tensor, found an integer"));
+  EXPECT_SENTENCE(file(""));
+  EXPECT_SENTENCE(file("\x80\x02N."));
+  EXPECT_SENTENCE(file(zip_bytes({{"a/version", "3"}})));
+  EXPECT_SENTENCE(file(zip_bytes({{"a/data.pkl", "\x80\x02N."}, {"a/byteorder", "big"}})));
+  EXPECT_SENTENCE(file(zip_bytes({{"a/data.pkl",
+                                   "\x80\x02"
+                                   "cos\nsystem\n."}})));
+  EXPECT_SENTENCE(file(zip_bytes({{"a/data.pkl",
+                                   "\x80\x02"
+                                   "ctorch._utils\n_rebuild_tensor_v2\n)R."}})));
+  EXPECT_SENTENCE(refusal(dict_of([](TorchWriter& out) { out.tensor("QInt8Storage", "a", 1, 0, {1}, {1}); })));
+  EXPECT_SENTENCE(refusal(dict_of([](TorchWriter& out) { out.pickle.integer(3); })));
 }
 
 TEST(TorchTensors, TruncatedAnywhereIsRefused) {
