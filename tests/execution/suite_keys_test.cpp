@@ -16,7 +16,6 @@
 namespace duet {
 namespace {
 
-using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -70,9 +69,7 @@ TEST(SuiteKeys, WhatIsOfClipsIsRefusedBesideAReference) {
                            "reference: {velocity: [0, 0, 0]}\nengines: [playback]\n"
                            "controllers: [pd]\n";
   for (const char* key : {"tasks: [hug]", "start: act", "max_root_speed: 1", "retarget: {kernel: v3}"})
-    EXPECT_THAT(test::thrown_message<InputError>([&] { parse_suite(base + key + "\n", "w.yaml"); }),
-                HasSubstr("expected no such key beside `reference`"))
-        << key;
+    EXPECT_SENTENCE(test::thrown_message<InputError>([&] { parse_suite(base + key + "\n", "w.yaml"); }));
 }
 
 TEST(SuiteKeys, TheFuseTicksThatASuiteTakesAreThoseOfTheScheduler) {
@@ -90,15 +87,12 @@ TEST(SuiteKeys, TheRootsSpeedHasADefaultThatNoHashSees) {
   EXPECT_THAT(resolved_yaml(slow), HasSubstr("\nmax_root_speed: 0.6\n"));
   EXPECT_NE(suite_hash(slow), suite_hash(plain));
   EXPECT_EQ(parse_suite(resolved_yaml(slow), "again.yaml").max_root_speed, 0.6);
-  EXPECT_THAT(refusal_of("max_root_speed: 0\n"),
-              AllOf(HasSubstr("k.yaml:8"), HasSubstr("max_root_speed: expected a number above 0, at most 10 m/s")));
+  EXPECT_SENTENCE(refusal_of("max_root_speed: 0\n"));
 }
 
 TEST(SuiteKeys, PairOptionsAreHeldAgainstEachOther) {
-  EXPECT_THAT(refusal_of("retarget: {mode: grounded, root: per-frame}\n"),
-              AllOf(HasSubstr("k.yaml:8"), HasSubstr("root=per-frame would lift")));
-  EXPECT_THAT(refusal_of("retarget:\n  w-kin: 1\n  root: free\n"),
-              AllOf(HasSubstr("k.yaml:10"), HasSubstr("pair option 'root' has no value 'free'")));
+  EXPECT_SENTENCE(refusal_of("retarget: {mode: grounded, root: per-frame}\n"));
+  EXPECT_SENTENCE(refusal_of("retarget:\n  w-kin: 1\n  root: free\n"));
 }
 
 TEST(SuiteKeys, ClipsMayBePadded) {
@@ -112,9 +106,8 @@ TEST(SuiteKeys, ClipsMayBePadded) {
   EXPECT_EQ(suite_hash(suite_with("", "clips: {synth: {per_task: 1}, pad: {before: 0}}\n")), suite_hash(plain));
   EXPECT_NE(suite_hash(padded_suite), suite_hash(plain));
   EXPECT_EQ(suite_hash(parse_suite(resolved_yaml(padded_suite), "again.yaml")), suite_hash(padded_suite));
-  EXPECT_THAT(refusal_of("", "clips: {synth: {per_task: 1}, pad: {before: -1}}\n"),
-              HasSubstr("before: expected a number from 0, at most 60 s, found -1"));
-  EXPECT_THAT(refusal_of("", "clips: {synth: {per_task: 1}, pad: {befor: 1}}\n"), HasSubstr("did you mean 'before'"));
+  EXPECT_SENTENCE(refusal_of("", "clips: {synth: {per_task: 1}, pad: {before: -1}}\n"));
+  EXPECT_SENTENCE(refusal_of("", "clips: {synth: {per_task: 1}, pad: {befor: 1}}\n"));
 }
 
 TEST(SuiteKeys, PaddedClipsAreLongerAndMotionsThatAreMadeAreRefused) {
@@ -132,10 +125,8 @@ TEST(SuiteKeys, PaddedClipsAreLongerAndMotionsThatAreMadeAreRefused) {
   EXPECT_EQ(longer.phases.act_begin, clip.phases.act_begin + 50);
   EXPECT_EQ(longer.phases.act_end, clip.phases.act_end + 50);
   save_paired_motion(longer, folder / "paired.npz");
-  EXPECT_THAT(test::thrown_message<InputError>([&] {
-                load_or_retarget(Npz::load(folder / "paired.npz"), *robot, quick, Implausible::kRefused, pad);
-              }),
-              AllOf(HasSubstr("paired.npz"), HasSubstr("expected a clip of two people, as only these can be padded")));
+  EXPECT_SENTENCE(test::thrown_message<InputError>(
+      [&] { load_or_retarget(Npz::load(folder / "paired.npz"), *robot, quick, Implausible::kRefused, pad); }));
 }
 
 }  // namespace

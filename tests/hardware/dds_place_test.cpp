@@ -1,12 +1,9 @@
-#include <gmock/gmock.h>
 
 #include "duet/hardware/wire/robot_wire.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
-
-using ::testing::HasSubstr;
 
 std::string refusal(const DdsPlace& place) {
   return test::thrown_message<std::invalid_argument>([&] { check_place(place); });
@@ -15,19 +12,18 @@ std::string refusal(const DdsPlace& place) {
 TEST(DdsPlace, NeedsANamedInterface) {
   EXPECT_NO_THROW(check_place({0, "eth1"}));
   for (const char* interface : {"", "auto", "a\"/><x", "eth0 eth1", "averyveryverylongname"})
-    EXPECT_THAT(refusal({0, interface}), HasSubstr("expected the name of one")) << interface;
+    EXPECT_SENTENCE(refusal({0, interface}));
 }
 
 TEST(DdsPlace, NeedsADomain) {
-  for (const int domain : {-1, 200, 1000}) EXPECT_THAT(refusal({domain, "lo"}), HasSubstr("expected 0 to 199"));
+  for (const int domain : {-1, 200, 1000}) EXPECT_SENTENCE(refusal({domain, "lo"}));
 }
 
 TEST(DdsPlace, ATwinsIsOnLoopbackInDomainsOfItsOwn) {
   EXPECT_NO_THROW(check_twin_place({100, "lo"}));
   EXPECT_NO_THROW(check_twin_place({199, "lo"}));
   for (const DdsPlace& place : {DdsPlace{0, "lo"}, DdsPlace{99, "lo"}, DdsPlace{150, "eth0"}})
-    EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { check_twin_place(place); }),
-                HasSubstr("twin: expected a domain from 100 to 199 on 'lo'"));
+    EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { check_twin_place(place); }));
 }
 
 }  // namespace

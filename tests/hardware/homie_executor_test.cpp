@@ -1,7 +1,6 @@
 // HOMIE's processes as the executor: a stand-in for them on the loopback interface's multicast, as LCM has it.
 #include "duet/hardware/executors/homie_executor.h"
 
-#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <thread>
@@ -14,7 +13,6 @@ namespace duet {
 namespace {
 
 using test::GuardedTwin;
-using ::testing::HasSubstr;
 
 constexpr double kGuardDt = 0.002;
 
@@ -112,7 +110,7 @@ TEST(HomieExecutor, HearsOfHomieByItsEchoAlone) {
   HomieExecutor executor(own_group(), 0.74, kGuardDt);
   executor.poll(1.0);
   EXPECT_EQ(executor.heard_at(), kNever);
-  EXPECT_THAT(executor.complaint(), HasSubstr("has not been heard"));
+  EXPECT_SENTENCE(executor.complaint());
   LcmBuffer buffer;
   robot.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
   executor.poll(2.0);
@@ -130,7 +128,7 @@ TEST(HomieExecutor, OneWriterIsHomiesAndMoreAreForeign) {
   LcmBuffer buffer;
   robot.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
   executor.poll(1.0);
-  EXPECT_EQ(executor.complaint(), "expected one writer of commands, HOMIE's controller, found 0");
+  EXPECT_SENTENCE(executor.complaint());
 }
 
 // T8: HOMIE cannot tell two senders apart; this side can.
@@ -175,12 +173,10 @@ TEST(FakeHomie, NoticesAWrongFingerprintAndASwappedChannel) {
 TEST(LcmChannel, RefusesAnInterfaceAndAGroupThatAreNone) {
   LcmPlace place;
   place.interface = "nosuch0";
-  EXPECT_THAT(test::thrown_message<std::runtime_error>([&] { LcmChannel channel(place); }),
-              HasSubstr("LCM: cannot use 239.255.76.67:7667 on interface 'nosuch0'"));
+  EXPECT_SENTENCE(test::thrown_message<std::runtime_error>([&] { LcmChannel channel(place); }));
   place = {};
   place.group = "10.0.0.1";
-  EXPECT_THAT(test::thrown_message<std::runtime_error>([&] { LcmChannel channel(place); }),
-              HasSubstr("expected the address of a multicast group, found '10.0.0.1'"));
+  EXPECT_SENTENCE(test::thrown_message<std::runtime_error>([&] { LcmChannel channel(place); }));
 }
 
 // The whole way in one process: guard, HOMIE's stand-in on the multicast, twin.

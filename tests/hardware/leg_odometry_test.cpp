@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include <cmath>
 
@@ -128,10 +127,8 @@ TEST(LegOdometry, TakesWholeNewStatesAlone) {
 }
 
 TEST(LegOdometry, NeedsSoles) {
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { LegOdometry odometry(nullptr); }),
-              ::testing::HasSubstr("leg odometry: expected a robot with soles, found none"));
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { LegOdometry odometry(test::g1(), 0.0); }),
-              ::testing::HasSubstr("expected a period above 0 s, found 0"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { LegOdometry odometry(nullptr); }));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { LegOdometry odometry(test::g1(), 0.0); }));
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 // One test for each clamp of the limiter with nobody near; those of a person are in limiter_person_test.cpp.
 #include "duet/hardware/safety/limiter.h"
 
-#include <gmock/gmock.h>
-
 #include <cmath>
 #include <limits>
 
@@ -14,7 +12,6 @@ namespace duet {
 namespace {
 
 using test::LimitedRobot;
-using ::testing::HasSubstr;
 constexpr double kRounding = 1e-9;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -339,20 +336,19 @@ TEST(Limiter, RefusesASetupThatIsWrong) {
     spoil(setup);
     return test::thrown_message<std::invalid_argument>([&] { Limiter limiter(setup); });
   };
-  EXPECT_THAT(refusal([](LimiterSetup& s) { s.robot = nullptr; }), HasSubstr("expected a robot, found none"));
-  EXPECT_THAT(refusal([](LimiterSetup& s) { s.dt = 0.0; }), HasSubstr("expected a dt above 0 s, found 0"));
-  EXPECT_THAT(refusal([](LimiterSetup& s) { s.executed.joints = {29}; }), HasSubstr("expected joints 0 to 28"));
-  EXPECT_THAT(refusal([](LimiterSetup& s) { s.executed.kp.resize(3); }), HasSubstr("gains of 29 joints, found 3"));
-  EXPECT_THAT(refusal([](LimiterSetup& s) { s.executed.kd[0] = -1.0; }), HasSubstr("not below 0"));
-  EXPECT_THAT(refusal([](LimiterSetup& s) { s.person = true; }), HasSubstr("the body of the person, found none"));
+  EXPECT_SENTENCE(refusal([](LimiterSetup& s) { s.robot = nullptr; }));
+  EXPECT_SENTENCE(refusal([](LimiterSetup& s) { s.dt = 0.0; }));
+  EXPECT_SENTENCE(refusal([](LimiterSetup& s) { s.executed.joints = {29}; }));
+  EXPECT_SENTENCE(refusal([](LimiterSetup& s) { s.executed.kp.resize(3); }));
+  EXPECT_SENTENCE(refusal([](LimiterSetup& s) { s.executed.kd[0] = -1.0; }));
+  EXPECT_SENTENCE(refusal([](LimiterSetup& s) { s.person = true; }));
 }
 
 TEST(Limiter, RefusesToStartFromAnythingButMeasuredAngles) {
   const Limiter limiter(test::nobody_near());
   RobotState state = test::g1()->standing_state();
   state.q[0] = kNan;
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { (void)limiter.start(state); }),
-              HasSubstr("expected 29 finite joint angles"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { (void)limiter.start(state); }));
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 // The partner over a socket: message, calibration, age by reception, 50 Hz, and the player that stands in for a camera.
 #include "duet/hardware/guard/person_input.h"
 
-#include <gmock/gmock.h>
-
 #include <limits>
 
 #include "duet/core/file.h"
@@ -13,8 +11,6 @@
 
 namespace duet {
 namespace {
-
-using ::testing::HasSubstr;
 
 PersonEstimate someone(std::uint64_t sequence, const Eigen::Vector3d& p_C = {0.0, 0.0, 3.0}) {
   PersonEstimate estimate;
@@ -230,9 +226,9 @@ TEST(PersonPlayer, NamesWhatIsWrong) {
   const auto refusal = [&](const PersonPlay& play) {
     return test::thrown_message<std::invalid_argument>([&] { PersonPlayer player(clip.actor_motion(), {}, {}, play); });
   };
-  EXPECT_THAT(refusal({.rate = 0.0}), HasSubstr("expected a rate above 0, found 0"));
-  EXPECT_THAT(refusal({.noise = -0.1}), HasSubstr("expected a noise of at least 0 m, found -0.1"));
-  EXPECT_THAT(refusal({.unseen = 1.5}), HasSubstr("expected a share from 0 to 1, found 1.5"));
+  EXPECT_SENTENCE(refusal({.rate = 0.0}));
+  EXPECT_SENTENCE(refusal({.noise = -0.1}));
+  EXPECT_SENTENCE(refusal({.unseen = 1.5}));
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 // Supplement A.4.3 on a root that lags, is late and is measured with noise: the figures of docs/hardware.md, "Walking
 // to a place".
-#include <gmock/gmock.h>
-
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -101,9 +99,8 @@ TEST(RootVelocity, AShortGoalNeverStarts) {
 }
 
 TEST(RootVelocity, IsRefusedWhereNobodyMeasuresTheRoot) {
-  EXPECT_THAT(
-      test::thrown_message<std::invalid_argument>([] { RootVelocity(OdometrySource::kNone, HardwareLimits{}); }),
-      ::testing::HasSubstr("expected a source of odometry (legs, external, vendor, twin), found none"));
+  EXPECT_SENTENCE(
+      test::thrown_message<std::invalid_argument>([] { RootVelocity(OdometrySource::kNone, HardwareLimits{}); }));
 }
 
 VelocityCommand answer_to(const OdometrySample& odometry, double now = 1.0) {

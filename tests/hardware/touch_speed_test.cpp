@@ -1,4 +1,3 @@
-#include <gmock/gmock.h>
 
 #include "duet/hardware/safety/limits.h"
 #include "tests/support.h"
@@ -27,14 +26,12 @@ TEST(TouchSpeed, IsThatOfTheTable) {
 
 TEST(TouchSpeed, NeedsForceStiffnessAndMass) {
   const RegionLimits bare{.region = "chest", .quasi_static_n = 140.0};
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([&] { (void)touch_speed(bare, kArm); }),
-            "contact limits of region 'chest': expected quasi_static_n, stiffness_n_mm and mass_kg, found less");
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { (void)touch_speed(bare, kArm); }));
 }
 
 TEST(TouchSpeed, NeedsAMass) {
   const RegionLimits chest{.region = "chest", .quasi_static_n = 140.0, .stiffness_n_mm = 25.0, .mass_kg = 40.0};
-  EXPECT_EQ(test::thrown_message<std::invalid_argument>([&] { (void)touch_speed(chest, 0.0); }),
-            "touch speed: expected a mass above 0 kg, found 0");
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { (void)touch_speed(chest, 0.0); }));
 }
 
 }  // namespace

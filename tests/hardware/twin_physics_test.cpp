@@ -1,6 +1,4 @@
 // The twin with an engine behind it: what the wire commands is all that holds it up.
-#include <gmock/gmock.h>
-
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -15,8 +13,6 @@
 
 namespace duet {
 namespace {
-
-using ::testing::HasSubstr;
 
 #define NEEDS_MUJOCO() \
   if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent"
@@ -142,12 +138,10 @@ TEST(TwinPhysics, TheSameSeedGivesTheSameFrames) {
 }
 
 TEST(TwinPhysics, RefusesAnotherStepAndAnUnknownEngine) {
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { TwinModel(test::g1(), {.engine = "mujocco"}); }),
-              HasSubstr("mujocco"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { TwinModel(test::g1(), {.engine = "mujocco"}); }));
   NEEDS_MUJOCO();
   TwinModel twin(test::g1(), simulated());
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { twin.step(0.01); }),
-              HasSubstr("expected steps of 0.002 s in an engine, found 0.01"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { twin.step(0.01); }));
 }
 
 TEST(TwinOperator, LetsNobodyDownWhoseArmsStillMove) {

@@ -12,10 +12,13 @@
 
 namespace duet::test {
 
+// Mangled apart from the shared pointers of that name in other rooms: a program may have both.
+inline namespace of_retarget {
 inline const RobotModel& g1() {
   static const RobotModel model = load_robot(default_card_path());
   return model;
 }
+}  // namespace of_retarget
 
 // Offsets of a standing person's joints from their parents (A pose, arms half down), 1.7 m tall. [m]
 inline std::array<Eigen::Vector3d, kSmplJoints> person_offsets() {

@@ -21,8 +21,6 @@
 namespace duet {
 namespace {
 
-using ::testing::HasSubstr;
-
 PairOptions mode(PairMode mode) { return pair_options_of(mode); }
 
 PairVariables random_above_legs(const PairProblem& problem, unsigned seed) {
@@ -278,9 +276,8 @@ TEST(LegPose, FindsThePoseThatMadeTheSoles) {
 TEST(PairOnGround, RobotsWithoutLegsAreRefusedByName) {
   RobotModel robot = test::g1();
   robot.roles.legs = {};
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
-                  [&] { retarget(test::random_clip(10, 1), robot, mode(PairMode::kGrounded)); }),
-              HasSubstr("robot 'g1': to stand on the ground, retargeting needs 'legs'"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>(
+      [&] { retarget(test::random_clip(10, 1), robot, mode(PairMode::kGrounded)); }));
 }
 
 TEST(PairOptionsModes, ModeComesFirstWhereverItStands) {
@@ -288,14 +285,10 @@ TEST(PairOptionsModes, ModeComesFirstWhereverItStands) {
   EXPECT_EQ(options.contact_blocks, ContactBlocks::kFull);
   EXPECT_EQ(options.optimizer, Optimizer::kLbfgs);
   EXPECT_TRUE(options.ground);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] {
-                validate(make_pair_options({{"mode", "grounded"}, {"root", "per-frame"}}));
-              }),
-              HasSubstr("root=per-frame would lift a robot"));
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] {
-                make_pair_options({{"mode", "floating"}});
-              }),
-              HasSubstr("paper, grounded, best"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] {
+    validate(make_pair_options({{"mode", "grounded"}, {"root", "per-frame"}}));
+  }));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { make_pair_options({{"mode", "floating"}}); }));
 }
 
 TEST(PairOnGround, HandsWeighAsAskedUnlessKeypointsAreListed) {
@@ -340,10 +333,9 @@ TEST(PairOnGround, AQuickerStepTakesLessFromTheStances) {
     EXPECT_GT(frames, before) << speed;
     before = frames;
   }
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] {
-                validate(make_pair_options({{"mode", "best"}, {"step-speed", "0"}}));
-              }),
-              HasSubstr("step-speed is 0; expected a speed above 0"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] {
+    validate(make_pair_options({{"mode", "best"}, {"step-speed", "0"}}));
+  }));
 }
 
 // A foot that rests, jumps by a camera's noise, steps and rests again.

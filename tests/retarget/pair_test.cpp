@@ -1,7 +1,5 @@
 #include "duet/retarget/solver/pair.h"
 
-#include <gmock/gmock.h>
-
 #include <ctime>
 #include <limits>
 
@@ -12,8 +10,6 @@
 
 namespace duet {
 namespace {
-
-using ::testing::HasSubstr;
 
 std::string refusal(const InteractionClip& clip, const RobotModel& robot = test::g1(), const PairOptions& o = {}) {
   return test::thrown_message<std::invalid_argument>([&] { retarget(clip, robot, o); });
@@ -238,15 +234,15 @@ TEST(Pair, SettingsNameEveryOptionAndTheKernelUsed) {
 TEST(Pair, ShortestSequenceIsFiveFrames) {
   EXPECT_NO_THROW(retarget(test::random_clip(5, 13), test::g1()));
   InteractionClip clip = test::random_clip(4, 13);
-  EXPECT_THAT(refusal(clip), HasSubstr("at least 5 frames at 50 Hz, found 4"));
+  EXPECT_SENTENCE(refusal(clip));
   clip = test::random_clip(9, 13, 120.0);  // 9 frames of 1/120 s are 4 of 1/50 s
-  EXPECT_THAT(refusal(clip), HasSubstr("found 4"));
+  EXPECT_SENTENCE(refusal(clip));
 }
 
 TEST(Pair, RefusesBadClipsRobotsAndOptions) {
   InteractionClip clip = test::random_clip(10, 14);
   clip.b.joints.at(3, kHead).x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(refusal(clip), HasSubstr("head"));
+  EXPECT_SENTENCE(refusal(clip));
 
   clip = test::random_clip(10, 14);
   clip.a = slice(clip.a, 0, 9);
@@ -255,16 +251,15 @@ TEST(Pair, RefusesBadClipsRobotsAndOptions) {
   clip = test::random_clip(10, 14);
   RobotModel robot = test::g1();
   robot.pairs.clear();
-  EXPECT_THAT(refusal(clip, robot), HasSubstr("robot 'g1': expected the 16 retarget pairs"));
+  EXPECT_SENTENCE(refusal(clip, robot));
 
   PairOptions options;
   options.weights.kin = -1.0;
-  EXPECT_THAT(refusal(clip, test::g1(), options), HasSubstr("'w-kin'"));
+  EXPECT_SENTENCE(refusal(clip, test::g1(), options));
 
   options = {};
   options.smpl_path = "/nonexistent/basis.npz";
-  EXPECT_THAT(test::thrown_message<InputError>([&] { retarget(clip, test::g1(), options); }),
-              HasSubstr("/nonexistent/basis.npz"));
+  EXPECT_SENTENCE(test::thrown_message<InputError>([&] { retarget(clip, test::g1(), options); }));
 }
 
 TEST(PairTiming, CountsFramesAndNamesTheKernel) {
@@ -275,9 +270,8 @@ TEST(PairTiming, CountsFramesAndNamesTheKernel) {
   EXPECT_EQ(timing.kernel, available_kernels().front());
   EXPECT_GT(timing.solver, 0.0);
   EXPECT_GT(timing.whole, 0.0);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
-                  [&] { time_pair(test::random_clip(25, 15), test::g1(), options, 0); }),
-              HasSubstr("at least one round"));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>(
+      [&] { time_pair(test::random_clip(25, 15), test::g1(), options, 0); }));
 }
 
 // Frames a second are of the fastest round: all rounds together took no less than that many times it.

@@ -249,12 +249,12 @@ TEST(Rollout, ADeadPolicyEndsTheEpisodeAsAnErrorNotAsAFailureToAct) {
   DyingPolicy policy(make_policy("replay", parts.robot));
   const Rollout rollout = play_back(setup, policy);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kError);
-  EXPECT_EQ(rollout.recording.message, "its process ended");
+  EXPECT_SENTENCE(rollout.recording.message);
   EXPECT_EQ(rollout.recording.frames(), kTicksPerPlan);
   const PolicyMaker maker = [&] { return std::make_unique<DyingPolicy>(make_policy("replay", parts.robot)); };
   const EpisodeRow row = parts.experiment->run(parts.spec, {.policy = maker});
   EXPECT_EQ(row.outcome, Outcome::kError);
-  EXPECT_EQ(row.message, "its process ended");
+  EXPECT_SENTENCE(row.message);
   EXPECT_TRUE(row.policy_faults.dead);
   EXPECT_EQ(row.success, false);
   EXPECT_TRUE(row.verdicts.empty());
