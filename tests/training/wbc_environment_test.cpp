@@ -72,7 +72,7 @@ TEST_F(WbcEnvironmentInMujoco, TimeEndsAnEpisodeOfFiveHundredTicks) {
 }
 
 TEST(WbcTask, AnUnknownStageIsRefusedWithTheKnownOnes) {
-  EXPECT_THAT([] { wbc_stage("run"); }, testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("interact")));
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { wbc_stage("run"); }));
 }
 
 TEST_F(WbcEnvironmentInMujoco, TimeIsUpAfterTheTicksOfTheTaskAndNoSooner) {
