@@ -95,6 +95,18 @@ Backend::Backend(Scene scene) : scene_(checked(std::move(scene))) {
   state_.v = Eigen::VectorXd::Zero(n);
   torques_ = Eigen::VectorXd::Zero(n);
   last_finite_ = state_;
+  held_ = {state_.q, state_.q, state_.q, state_.q};
+}
+
+// fmin and fmax leave no NaN: gains near the largest number may give one.
+const JointCommand& Backend::held_torque(const JointCommand& command) {
+  for (int i = 0; i < scene_.robot->dof(); ++i) {
+    const double torque =
+        command.kp[i] * (command.q_target[i] - state_.q[i]) - command.kd[i] * state_.v[i] + command.tau_ff[i];
+    const double effort = scene_.robot->joints[i].effort;
+    held_.tau_ff[i] = std::fmin(std::fmax(torque, -effort), effort);
+  }
+  return held_;
 }
 
 void Backend::reset(const RobotState& state) {
@@ -123,7 +135,7 @@ Outcome Backend::step(const JointCommand& command) {
   check_vector(command.tau_ff, *scene_.robot, "Backend::step: tau_ff", true);
   if (diverged_) return Outcome::kDiverged;
   assign(last_finite_, state_);
-  const Outcome outcome = do_step(command);
+  const Outcome outcome = do_step(scene_.law == TorqueLaw::kExplicit ? held_torque(command) : command);
   ++steps_;
   if (outcome != Outcome::kDiverged && all_finite(state_)) return outcome;
   diverged_ = true;

@@ -25,6 +25,11 @@ namespace duet {
 // ghost: the partner touches nothing (as in the supplement). solid: contacts act on the robot and are reported.
 enum class PartnerMode { kNone, kGhost, kSolid };
 
+// How PD and feed-forward of a JointCommand become torque. kImplicit: solved together with the step, stable at any gain
+// and step (ImplicitLaw says how). kExplicit: kp (q* - q) - kd v + tau_ff of the state at the step's start, held to the
+// effort and constant over the step, as a user of the engine who sets torques has it.
+enum class TorqueLaw { kImplicit, kExplicit };
+
 // Friction is stated per pair of bodies (docs/architecture.md, 4); the adapter finds values that give it.
 struct PairFriction {
   double robot_ground = 0.8;
@@ -41,6 +46,7 @@ struct Scene {
   PartnerMode partner = PartnerMode::kGhost;
   PairFriction friction;
   double dt = 0.002;  // physics step [s]
+  TorqueLaw law = TorqueLaw::kImplicit;
   // In W [m/s^2]. A tilted one is an incline.
   Eigen::Vector3d gravity = {0.0, 0.0, -kGravity};
   bool self_collision = true;  // the pairs of RobotModel::self_collision touch
@@ -81,9 +87,9 @@ class Backend {
   // Partner joints now; each following step moves them on at `velocities` until the next call. The first call after a
   // reset throws std::invalid_argument in an engine where the solid partner is inside the robot (narrow_phase.h).
   void set_partner(const HumanJoints& joints, const HumanJoints& velocities);
-  // One physics step of scene().dt with the torque law of JointCommand evaluated inside it. kDiverged is final until
-  // reset: state() then stays at the last finite one. Throws std::invalid_argument for wrong sizes, values that are not
-  // finite and negative gains.
+  // One physics step of scene().dt by scene().law; the explicit one reaches an engine as feed-forward without gains.
+  // kDiverged is final until reset: state() stays at the last finite one. Throws std::invalid_argument for wrong sizes,
+  // values that are not finite and negative gains.
   Outcome step(const JointCommand& command);
 
   [[nodiscard]] const RobotState& state() const { return state_; }
@@ -113,13 +119,17 @@ class Backend {
  private:
   virtual void do_reset() = 0;  // from state_
   virtual void do_set_partner(const HumanJoints& joints, const HumanJoints& velocities) = 0;
-  virtual Outcome do_step(const JointCommand& command) = 0;
+  virtual Outcome do_step(const JointCommand& command) = 0;  // by the implicit law
   virtual void do_push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W) = 0;
   virtual void do_kick(const Eigen::Vector3d& dv_W) = 0;   // state_ has the new velocity already
   virtual void do_snapshot(Snapshot& snapshot) const = 0;  // appends its values
   virtual void do_restore(std::span<const double> values) = 0;
 
+  // The torque of the explicit law now, as a command.
+  const JointCommand& held_torque(const JointCommand& command);
+
   Scene scene_;
+  JointCommand held_;
   RobotState last_finite_;
   long steps_ = 0;
   bool diverged_ = false;

@@ -123,8 +123,8 @@ inline std::uint64_t engine_interface() {
                   &RobotModel::self_collision, &RobotModel::feet, &RobotModel::neutral, &RobotModel::standing_height,
                   &RobotModel::digest);
   digest.add_type<HumanBody>();
-  digest.add_type(&Scene::robot, &Scene::human, &Scene::partner, &Scene::friction, &Scene::dt, &Scene::gravity,
-                  &Scene::self_collision, &Scene::options);
+  digest.add_type(&Scene::robot, &Scene::human, &Scene::partner, &Scene::friction, &Scene::dt, &Scene::law,
+                  &Scene::gravity, &Scene::self_collision, &Scene::options);
   digest.add_type(&RobotState::X_WB, &RobotState::v_WB, &RobotState::w_WB_B, &RobotState::q, &RobotState::v);
   digest.add_type(&Reference::X_WB, &Reference::q);
   digest.add_type(&JointCommand::q_target, &JointCommand::kp, &JointCommand::kd, &JointCommand::tau_ff);

@@ -8,10 +8,12 @@
 #include <utility>
 
 #include "duet/archives/recording_file.h"
+#include "duet/backends/actuation.h"
 #include "duet/backends/engine_module.h"
 #include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "duet/core/robot_state.h"
+#include "duet/experiment/plan/actuation_limits.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/work/run_work.h"
 #include "duet/experiment/work/stop_token.h"
@@ -121,8 +123,9 @@ std::string Experiment::lack_of(const EpisodeSpec& spec) {
 }
 
 Scene Experiment::scene(const EpisodeSpec& spec) const {
+  const EngineSettings settings = settings_under(*spec.perturbation, *spec.settings);
   Scene scene;
-  scene.robot = perturbed_robot(*spec.perturbation, spec.body->robot);
+  scene.robot = with_armature(perturbed_robot(*spec.perturbation, spec.body->robot), settings.armature);
   scene.friction.robot_ground = spec.perturbation->friction.value_or(scene.friction.robot_ground);
   scene.partner = suite_.partner;
   if (spec.reference == nullptr) {
@@ -131,8 +134,9 @@ Scene Experiment::scene(const EpisodeSpec& spec) const {
       for (double& bone : bones) bone *= spec.perturbation->partner->scale;
     scene.human = make_human_body(bones);
   }
-  scene.dt = spec.settings->dt;
-  scene.options = spec.settings->options;
+  scene.dt = settings.dt;
+  scene.law = settings.law;
+  scene.options = settings.options;
   return scene;
 }
 

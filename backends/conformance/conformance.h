@@ -21,6 +21,8 @@ enum class Effort { kQuick, kFull };
 struct Settings {
   double dt = 0.002;      // [s]
   EngineOptions options;  // what is not named has the engine's default
+  TorqueLaw law = TorqueLaw::kImplicit;
+  double armature = 1.0;  // share of the robot's
   Effort effort = Effort::kQuick;
   std::shared_ptr<const RobotModel> robot;  // of the scenes with a whole robot; null: the one that stands in
 };
@@ -59,8 +61,13 @@ struct ConformanceScene {
   std::string_view name;   // "free-flight"
   std::string_view shows;  // one sentence
   void (*measure)(Trial& trial);
+  // kLawGroup: what the scene asks holds under the torque law and the armature that the settings name alone; an engine
+  // with others fails here and nowhere else. "": it holds whatever drives the joints.
+  std::string_view group = "";
   std::string (*lacks)(const RobotModel& robot) = nullptr;  // what the scene needs of the robot and it has not, or ""
 };
+
+inline constexpr std::string_view kLawGroup = "law";
 
 std::span<const ConformanceScene> scenes();
 // Throws std::invalid_argument with the nearest and all known names.

@@ -1,8 +1,11 @@
 // The torque law of JointCommand at one joint, and in all joints of the G1 at their effort.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "duet/backends/actuation.h"
 #include "duet/backends/conformance/reference.h"
 #include "duet/backends/conformance/trial.h"
 #include "duet/backends/physics_backend.h"
@@ -158,6 +161,111 @@ void measure_joint_stop(Trial& trial) {
                 "10 N m into the stop, which it meets at 16 rad/s: three steps of travel at 2 ms");
   trial.absolute("violation at rest", "rad", trial.dt(), world.state().q[0] - stop, 0.0, 0.01, "under 10 N m");
   trial.absolute("velocity at rest", "rad/s", trial.dt(), world.state().v[0], 0.0, 1e-2, "2 s after the start");
+}
+
+// The closed forms of both laws at the wheel.
+
+namespace {
+
+// One joint of that inertia under PD, step by step: what an engine does at one joint, exactly.
+struct DiscreteJoint {
+  TorqueLaw law;
+  double inertia, dt;
+  double q = 0.0, v = 0.0;  // [rad], [rad/s]
+
+  [[nodiscard]] double acceleration(double kp, double kd, double target) const {
+    const double torque = kp * (target - q) - kd * v;
+    if (law == TorqueLaw::kExplicit) return std::clamp(torque, -kWheelEffort, kWheelEffort) / inertia;
+    return (torque - dt * kp * v) / (inertia + dt * kd + dt * dt * kp);
+  }
+  void step(double kp, double kd, double target) {
+    v += dt * acceleration(kp, kd, target);
+    q += dt * v;
+  }
+};
+
+struct DrivenWheel {
+  TorqueLaw law;
+  double armature;  // share
+
+  [[nodiscard]] std::string name(const std::string& quantity) const {
+    return fmt::format("{} ({}, armature {:g})", quantity, torque_law_names()[static_cast<std::size_t>(law)], armature);
+  }
+  [[nodiscard]] DiscreteJoint joint(double dt) const {
+    return {.law = law, .inertia = kWheelInertia + armature * kWheelArmature, .dt = dt};
+  }
+  [[nodiscard]] Scene scene(const Trial& trial, double dt) const {
+    Scene scene = trial.scene(wheel(), dt);
+    scene.robot = with_armature(wheel(), armature);
+    scene.law = law;
+    return scene;
+  }
+};
+
+// A second of the step response of kp = 100 I, kd = 5 I against the law's own recursion.
+void measure_recursion(Trial& trial, const DrivenWheel& driven, double dt) {
+  constexpr double kTarget = 0.2, kSeconds = 1.0, kNatural = 10.0;
+  World world(trial, driven.scene(trial, dt));
+  DiscreteJoint exact = driven.joint(dt);
+  JointCommand command = no_torque(world.robot());
+  command.q_target[0] = kTarget;
+  command.kp[0] = kNatural * kNatural * exact.inertia;
+  command.kd[0] = 0.5 * kNatural * exact.inertia;
+  start_wheel(world);
+  trial.relative(driven.name("first acceleration"), "rad/s^2", dt, first_acceleration(world, command),
+                 exact.acceleration(command.kp[0], command.kd[0], kTarget), 2.0 * kBaseGivesWay, "of the law");
+  start_wheel(world);
+  double error = 0.0;
+  for (int i = 0; i < steps_in(kSeconds, dt); ++i) {
+    world.step(command);
+    exact.step(command.kp[0], command.kd[0], kTarget);
+    error = std::max(error, std::abs(world.state().q[0] - exact.q));
+  }
+  trial.at_most(driven.name("largest error in 1 s"), "rad", dt, error, kTarget * kNatural * kSeconds * kBaseGivesWay,
+                "against the law's recursion; phase that the base's giving way costs");
+}
+
+// Ten steps of damping alone, dt kd = `ratio` I. By the explicit law the speed is multiplied by 1 - ratio in each step,
+// which grows above 2; by the implicit one it is divided by 1 + ratio.
+void measure_damping(Trial& trial, const DrivenWheel& driven, double dt, double ratio) {
+  constexpr int kSteps = 10;
+  constexpr double kSpeed = 0.01;  // [rad/s]: below the effort, also after 10 growing steps
+  World world(trial, driven.scene(trial, dt));
+  const DiscreteJoint joint = driven.joint(dt);
+  JointCommand command = no_torque(world.robot());
+  command.kd[0] = ratio * joint.inertia / dt;
+  RobotState start = state_at(world.robot(), {0.0, 0.0, 50.0});
+  start.v[0] = kSpeed;
+  world.reset(start);
+  hold_base(world.backend());
+  for (int i = 0; i < kSteps; ++i) world.step(command);
+  const double kept = driven.law == TorqueLaw::kExplicit ? 1.0 - ratio : 1.0 / (1.0 + ratio);
+  trial.relative(driven.name(fmt::format("speed kept by ten steps at dt kd = {:g} I", ratio)), "", dt,
+                 world.state().v[0] / kSpeed, std::pow(kept, kSteps), 4.0 * kSteps * kBaseGivesWay,
+                 driven.law == TorqueLaw::kExplicit ? "(1 - ratio)^10: stable below 2, and above it grows"
+                                                    : "(1 + ratio)^-10: stable at any step");
+}
+
+}  // namespace
+
+void measure_law(Trial& trial) {
+  for (const TorqueLaw law : {TorqueLaw::kImplicit, TorqueLaw::kExplicit})
+    for (const double armature : {1.0, 0.0}) {
+      const DrivenWheel driven{law, armature};
+      for (const double dt : trial.step_sizes()) measure_recursion(trial, driven, dt);
+      for (const double ratio : {1.9, 2.1}) measure_damping(trial, driven, trial.dt(), ratio);
+    }
+  const DrivenWheel driven{TorqueLaw::kExplicit, 1.0};
+  World world(trial, driven.scene(trial, trial.dt()));
+  JointCommand command = no_torque(world.robot());
+  command.kp[0] = 1000.0;
+  command.q_target[0] = -1.0;
+  command.tau_ff[0] = 2.0 * kWheelEffort;
+  trial.relative(driven.name("acceleration under a stiff spring"), "rad/s^2", trial.dt(),
+                 first_acceleration(world, command), -kWheelEffort / kInertia, 2.0 * kBaseGivesWay,
+                 "the effort limits the sum of PD and feed-forward");
+  trial.relative(driven.name("reported torque at the limit"), "N m", trial.dt(), world.backend().torques()[0],
+                 -kWheelEffort, 1e-9, "the effort");
 }
 
 // Rods that swing from a held base.

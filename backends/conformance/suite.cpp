@@ -21,18 +21,23 @@ constexpr std::array kScenes = {
     ConformanceScene{"acceleration", "accelerations of the robot in random states are those of our Newton-Euler",
                      measure_acceleration},
     ConformanceScene{"free-flight", "0.2 s of the robot in the air against our Runge-Kutta integration",
-                     measure_free_flight},
+                     measure_free_flight, kLawGroup},
     ConformanceScene{"momentum", "inner forces of a thrashing robot without gravity leave its momentum",
-                     measure_momentum},
+                     measure_momentum, kLawGroup},
     ConformanceScene{"box-simple", "a box thrown with a slow spin about a principal axis", measure_box_simple},
     ConformanceScene{"box-complex", "a box tumbling about its intermediate axis", measure_box_complex},
     ConformanceScene{"pendulum", "period and energy of a pendulum at 90 degrees", measure_pendulum},
     ConformanceScene{"chain", "a chain of two links against our Runge-Kutta integration", measure_chain},
-    ConformanceScene{"armature", "a wheel accelerates with torque over inertia plus armature", measure_armature},
-    ConformanceScene{"effort", "the effort limits PD and feed-forward together, armature apart", measure_effort},
-    ConformanceScene{"step-response", "a joint under PD is the damped oscillator of its gains", measure_step_response},
+    ConformanceScene{"armature", "a wheel accelerates with torque over inertia plus armature", measure_armature,
+                     kLawGroup},
+    ConformanceScene{"effort", "the effort limits PD and feed-forward together, armature apart", measure_effort,
+                     kLawGroup},
+    ConformanceScene{"step-response", "a joint under PD is the damped oscillator of its gains", measure_step_response,
+                     kLawGroup},
     ConformanceScene{"saturation", "all joints of the robot with a step beyond their effort, against our law at 0.1 ms",
-                     measure_saturation},
+                     measure_saturation, kLawGroup},
+    ConformanceScene{"law", "both laws, with and without armature, are their own recursions at one joint", measure_law,
+                     kLawGroup},
     ConformanceScene{"joint-stop", "a driven joint stops at its limit", measure_joint_stop},
     ConformanceScene{"incline", "slip angle and sliding on an incline along x, y and the diagonal", measure_incline},
     ConformanceScene{"rolling-ball", "a sliding ball comes to roll", measure_rolling_ball},
@@ -40,12 +45,13 @@ constexpr std::array kScenes = {
                      measure_skin_bounce},
     ConformanceScene{"ground-bounce", "the ground does not give energy back", measure_ground_bounce},
     ConformanceScene{"stand", "the robot stands under ankle feedback and its weight is carried", measure_stand,
-                     lacks_ankles},
-    ConformanceScene{"fall", "the robot without feedback falls at the same time everywhere", measure_fall, lacks_soles},
+                     kLawGroup, lacks_ankles},
+    ConformanceScene{"fall", "the robot without feedback falls at the same time everywhere", measure_fall, kLawGroup,
+                     lacks_soles},
     ConformanceScene{"held-push", "a person pushes the torso and holds: momentum, peak and held force",
-                     measure_held_push, lacks_trunk_or_ankles},
+                     measure_held_push, kLawGroup, lacks_trunk_or_ankles},
     ConformanceScene{"self-collision", "a hand sent into the trunk is stopped, momentum stays", measure_self_collision,
-                     lacks_hand_poses},
+                     kLawGroup, lacks_hand_poses},
     ConformanceScene{"repeat", "snapshot in contact, rerun, second thread and reset continue bitwise", measure_repeat},
 };
 
@@ -166,7 +172,10 @@ Tally tally(const EngineReport& report) {
 }
 
 std::vector<std::string> stale_deviations(const EngineReport& report) {
-  if (!report.settings.options.empty() || report.settings.dt != Settings{}.dt) return {};
+  const Settings& run = report.settings;
+  if (!run.options.empty() || run.dt != Settings{}.dt || run.law != Settings{}.law ||
+      run.armature != Settings{}.armature)
+    return {};
   std::vector<std::string> stale;
   for (const EngineDeviation& entry : deviations(report.engine)) {
     if (entry.only_at_full_effort && report.settings.effort != Effort::kFull) continue;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "duet/backends/actuation.h"
 #include "duet/backends/engine_module.h"
 #include "duet/backends/physics_backend.h"
 #include "duet/robots/robot_cards.h"
@@ -25,7 +26,8 @@ std::vector<double> Trial::step_sizes() const {
 
 Scene Trial::scene(std::shared_ptr<const RobotModel> robot, double dt) const {
   Scene scene;
-  scene.robot = std::move(robot);
+  scene.robot = with_armature(std::move(robot), settings_.armature);
+  scene.law = settings_.law;
   scene.partner = PartnerMode::kNone;
   scene.dt = dt;
   scene.self_collision = false;

@@ -107,6 +107,7 @@ void measure_armature(Trial& trial);
 void measure_effort(Trial& trial);
 void measure_step_response(Trial& trial);
 void measure_saturation(Trial& trial);
+void measure_law(Trial& trial);
 void measure_joint_stop(Trial& trial);
 // contact_scenes.cpp
 void measure_incline(Trial& trial);

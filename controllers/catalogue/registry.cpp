@@ -169,6 +169,40 @@ LoadedController load_controller(const std::string& name, const std::shared_ptr<
 
 namespace {
 
+JointGains gains_of(const Descriptor& descriptor, const RobotModel& robot) {
+  const JointCommand card = robot.default_command(robot.neutral);
+  JointGains gains{card.kp, card.kd};
+  const auto take = [&](const auto& joints) {
+    for (const auto& joint : joints) {
+      const auto found = std::ranges::find(robot.joints, joint.name, &RobotJoint::name);
+      if (found == robot.joints.end()) continue;
+      gains.kp[found - robot.joints.begin()] = joint.kp;
+      gains.kd[found - robot.joints.begin()] = joint.kd;
+    }
+  };
+  take(descriptor.other_joints);
+  take(descriptor.joints);
+  return gains;
+}
+
+}  // namespace
+
+JointGains standing_gains(Controller& controller, const RobotModel& robot) {
+  const RobotState state = robot.standing_state();
+  JointCommand command = robot.default_command(state.q);
+  controller.reset(state);
+  controller.act(state, {state.X_WB, state.q}, command);
+  return {command.kp, command.kd};
+}
+
+JointGains standing_gains(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
+                          const ControllerOptions& options) {
+  if (find_entry(name).load == load_published) return gains_of(load_descriptor(name), *robot);
+  return standing_gains(*make_controller(name, robot, options), *robot);
+}
+
+namespace {
+
 std::string setting(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "" : value;

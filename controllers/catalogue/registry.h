@@ -10,6 +10,7 @@
 #include "duet/controllers/descriptor.h"
 #include "duet/controllers/root_conversion.h"
 #include "duet/core/file.h"
+#include "duet/robots/explicit_step.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {
@@ -40,6 +41,12 @@ struct LoadedController {
 // Throws as make_controller.
 LoadedController load_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
                                  const ControllerOptions& options = {});
+
+// The gains by which a controller holds the robot in its standing pose, where it is asked for a command.
+JointGains standing_gains(Controller& controller, const RobotModel& robot);
+// The same by name; a published one's are its descriptor's and need no network. Throws as make_controller.
+JointGains standing_gains(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
+                          const ControllerOptions& options = {});
 
 // Makes one controller per episode. The robot is never null; options are known to be those of the ControllerInfo.
 using ControllerMaker =

@@ -11,6 +11,7 @@
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
+#include "duet/experiment/plan/actuation_limits.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/policies/external/descriptor.h"
 #include "duet/policies/policy.h"
@@ -64,6 +65,13 @@ void require_parts_of(const Suite& suite, const RobotModel& robot, const std::st
                                robot.name, suite.name, fmt::join(lacks, ", ")));
 }
 
+bool has_explicit_law(const Suite& suite) {
+  const auto is_explicit = [](const std::optional<TorqueLaw>& law) { return law == TorqueLaw::kExplicit; };
+  return std::ranges::any_of(suite.profile.engines, [&](const auto& one) { return is_explicit(one.second.law); }) ||
+         std::ranges::any_of(suite.perturbations,
+                             [&](const Perturbation& one) { return one.actuation && is_explicit(one.actuation->law); });
+}
+
 // Its descriptor was read with the suite, and is now.
 void require_same_facts(const SuiteController& controller) {
   const ControllerInfo then = about(controller), now = controller_info(controller.use);
@@ -114,8 +122,10 @@ void Embodiments::load_controller_of(const Suite& suite, const SuiteController& 
   if (!suite.is_commanded()) require_joints_of(*nominal(), *robot, controller.name);
   require_parts_of(suite, *robot, suite.card_of(controller));
   LoadedController loaded = load_controller(controller.use, robot, controller.options);
-  static_cast<void>(loaded.make(controller.options));
+  const std::unique_ptr<Controller> made = loaded.make(controller.options);
   take_notes(loaded.notes);
+  if (has_explicit_law(suite))
+    take_notes(actuation_notes(suite, controller.name, robot, standing_gains(*made, *robot)));
   for (const Perturbation& perturbation : suite.perturbations) check_perturbation(perturbation, *robot);
   controllers_[controller.name] = {robot, std::move(loaded)};
   place_[controller.name] = place;

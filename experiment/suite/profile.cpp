@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 
 #include "duet/backends/engine_module.h"
@@ -19,7 +18,6 @@ namespace duet {
 namespace {
 
 constexpr std::string_view kProfileSchema = "duet.profile/1";
-constexpr double kShortestStep = 1e-6;  // [s]; 20,000 steps a control period, far below what any engine asks for
 
 std::vector<std::string> physics_engines() {
   std::vector<std::string> names;
@@ -32,22 +30,21 @@ EngineSettings read_settings(const YAML::Node& node, const std::string& engine, 
     throw InputError(fmt::format("{}:{}: {}", file, std::max(at.Mark().line, 0) + 1, message));
   };
   if (!node.IsMap()) fail(node, fmt::format("{}: expected a mapping, found {}", engine, describe(node)));
+  const FieldTable<EngineSettings> actuation = actuation_fields<EngineSettings>();
   EngineSettings settings;
   for (const auto& entry : node) {
     const std::string key = entry.first.as<std::string>();
     if (!entry.second.IsScalar())
       fail(entry.first, fmt::format("{}.{}: expected one value, found {}", engine, key, describe(entry.second)));
     const std::string value = entry.second.Scalar();
+    if (const Field<EngineSettings>* known = find_field(actuation, key)) {
+      const std::string expected = set_field(*known, settings, value);
+      if (!expected.empty()) fail(entry.first, fmt::format("{}: {}", engine, field_refusal(*known, expected, value)));
+      continue;
+    }
     try {
-      if (key == "dt") {
-        settings.dt = entry.second.as<double>();
-        check_step(settings.dt);
-      } else {
-        settings.options[key] = value;
-        if (is_available(engine)) check_options(engine, {{key, value}}, engine_module(engine).options);
-      }
-    } catch (const YAML::Exception&) {
-      fail(entry.first, fmt::format("{}.dt: expected a number, found '{}'", engine, value));
+      settings.options[key] = value;
+      if (is_available(engine)) check_options(engine, {{key, value}}, engine_module(engine).options);
     } catch (const std::invalid_argument& error) {
       fail(entry.first, fmt::format("{}: {}", engine, error.what()));
     }
@@ -62,12 +59,6 @@ std::filesystem::path shipped_folder() {
 }  // namespace
 
 bool is_available(const std::string& engine) { return find_engine_module(engine) != nullptr; }
-
-void check_step(double dt) {
-  const double steps = kTick / dt;
-  require(dt >= kShortestStep && dt <= kTick && std::abs(steps - std::round(steps)) < 1e-9,
-          "expected a step [s] of {} or more that divides {}, found {}", kShortestStep, kTick, dt);
-}
 
 EngineSettings Profile::settings(const std::string& engine) const {
   const auto found = engines.find(engine);
@@ -118,6 +109,9 @@ std::vector<std::string> profile_names() {
 
 std::string settings_yaml(const EngineSettings& settings) {
   std::string text = fmt::format("{{dt: {}", settings.dt);
+  for (const Field<EngineSettings>& known : actuation_fields<EngineSettings>())
+    if (const std::string value = known.text(settings); known.name != "dt" && value != known.text(EngineSettings()))
+      text += fmt::format(", {}: {}", known.name, value);
   for (const auto& [name, value] : settings.options) text += fmt::format(", {}: {}", name, value);
   return text + "}";
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "duet/backends/actuation.h"
 #include "duet/backends/backend.h"
 
 namespace duet {
@@ -15,6 +16,8 @@ namespace duet {
 struct EngineSettings {
   double dt = 0.002;  // physics step [s]
   EngineOptions options;
+  TorqueLaw law = TorqueLaw::kImplicit;
+  double armature = 1.0;  // share of the card's
 };
 
 struct Profile {
@@ -37,13 +40,11 @@ Profile load_profile(const std::string& profile);
 // Whether this machine has an engine of that name.
 bool is_available(const std::string& engine);
 
-// Throws std::invalid_argument unless the step [s] divides the control period of 0.02 s.
-void check_step(double dt);
-
 // Names of the profiles that ship with duet.
 std::vector<std::string> profile_names();
 
-// One line of YAML, "{dt: 0.002, iterations: 20}", with what the settings say.
+// One line of YAML, "{dt: 0.002, iterations: 20}", with what the settings say; law and armature where they are not the
+// implicit one and the card's.
 std::string settings_yaml(const EngineSettings& settings);
 // The same with every option of the engine written out where it is present; and its SHA-256, what rows carry.
 std::string resolved_settings(const std::string& engine, const EngineSettings& settings);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "duet/backends/actuation.h"
 #include "duet/backends/engine_module.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
@@ -239,14 +240,19 @@ std::string profile_yaml(const Profile& profile) {
   return text;
 }
 
-// The step of all engines: of every engine that duet knows, not of those that `engines: all` is on this machine, as the
-// suite's hash says it.
-void read_step(const YamlSection& top, Suite& suite) {
-  if (!top.has("dt")) return;
-  const double dt = top.number("dt");
-  checked(top, "dt", [&] { check_step(dt); });
-  for (const EngineInfo& engine : engines())
-    suite.profile.engines[engine.name] = {dt, suite.profile.settings(engine.name).options};
+// Law, armature and step of all engines: of every engine that duet knows, not of those that `engines: all` is on this
+// machine, as the suite's hash says it.
+SuiteKey actuation_key(const Field<EngineSettings>& value) {
+  const auto read = [value](const YamlSection& top, Suite& suite) {
+    if (!top.has(value.name.c_str())) return;
+    for (const EngineInfo& engine : engines()) {
+      EngineSettings settings = suite.profile.settings(engine.name);
+      read_field(top, value, settings);
+      suite.profile.engines[engine.name] = std::move(settings);
+    }
+  };
+  return SchemaKey<Suite>{
+      value.name, read, {{value.name, value.values, "the profile's", value.meaning + ", of every engine"}}};
 }
 
 void add_profile(Keys& keys) {
@@ -256,10 +262,7 @@ void add_profile(Keys& keys) {
       {{"profile", "a name, a path or a mapping", "parity",
         "engine profile: a name (`duet list profiles`), a file (from the suite's folder), or its mapping"}},
       [](const Suite& suite) { return profile_yaml(suite.profile); }});
-  keys.emplace_back(SchemaKey<Suite>{
-      "dt",
-      read_step,
-      {{"dt", "a number that divides 0.02 s, 1e-6 or more", "the profile's", "physics step of every engine"}}});
+  for (const Field<EngineSettings>& known : actuation_fields<EngineSettings>()) keys.push_back(actuation_key(known));
 }
 
 void read_robot(const YamlSection& top, const Field<Suite>& robot, Suite& suite) {

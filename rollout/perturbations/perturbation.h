@@ -60,6 +60,14 @@ int perturbed_link(const std::string& name, const RobotModel& robot);
 // The name of the card's push_link where `name` is "".
 std::string named_link(const std::string& name, const RobotModel& robot);
 
+// Another law, share of the card's armature or physics step than the profile's (backends/actuation.h); what is none is
+// the profile's. As it stands: torques set from the state, in an engine that knows no armature, at its users' step.
+struct ActuationChange {
+  std::optional<TorqueLaw> law = TorqueLaw::kExplicit;
+  std::optional<double> armature = 0.0;
+  std::optional<double> dt = 0.001;  // [s]
+};
+
 inline constexpr const char* kCleanName = "clean";
 
 struct Perturbation {
@@ -67,6 +75,7 @@ struct Perturbation {
   int delay_ticks = 0;             // the controller sees the state of so many ticks ago
   double latency_ms = 0.0;         // from a command to its effect, to the nearest physics step
   std::optional<double> friction;  // of the robot and the ground
+  std::optional<ActuationChange> actuation = {};
   std::vector<std::shared_ptr<const RobotPerturbation>> robot = {};  // in the order of the table of kinds
   PerceptionPlan perception;
   double plan_latency_ms = 0.0;  // from what a policy saw to its plan in the scheduler, to the nearest tick

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "duet/backends/actuation.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/robots/yaml_section.h"
@@ -102,6 +103,9 @@ void add_body_kinds(Kinds& list) {
                &P::friction),
       "0.4"));
   list.push_back(mass_kind());
+  list.push_back(planned_kind("actuation", "the joints are driven otherwise; what is not named is the profile's",
+                              actuation_fields<ActuationChange>(), [](auto& p) -> auto& { return p.actuation; },
+                              {.law = std::nullopt, .armature = std::nullopt, .dt = std::nullopt}));
 }
 
 // Adds the kinds that change how the policy sees its partner; physics, detectors and recording have the real one.
@@ -158,7 +162,7 @@ const std::vector<KindAxis>& kind_axes() {
 
 Kinds make_kinds() {
   Kinds list;
-  list.reserve(15);
+  list.reserve(16);
   add_body_kinds(list);
   add_perception_kinds(list);
   list.push_back(valued_kind(

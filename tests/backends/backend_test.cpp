@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 
+#include "duet/backends/actuation.h"
 #include "duet/backends/engine_module.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
@@ -27,11 +28,15 @@ class Still final : public Backend {
   explicit Still(const Scene& scene) : Backend(scene) {}
   [[nodiscard]] std::string_view name() const override { return "still"; }
   [[nodiscard]] std::string version() const override { return "1"; }
+  JointCommand got;  // of the last step
 
  private:
   void do_reset() override {}
   void do_set_partner(const HumanJoints&, const HumanJoints&) override {}
-  Outcome do_step(const JointCommand&) override { return Outcome::kOk; }
+  Outcome do_step(const JointCommand& command) override {
+    got = command;
+    return Outcome::kOk;
+  }
   void do_push(int, const Eigen::Vector3d&, const Eigen::Vector3d&) override {}
   void do_kick(const Eigen::Vector3d&) override {}
   void do_snapshot(Snapshot&) const override {}
@@ -55,6 +60,44 @@ struct BackendChecks : ::testing::Test {
   RobotState state = test::state_of(*backend->scene().robot, Eigen::Vector3d::Zero());
   JointCommand command = test::no_torque(*backend->scene().robot);
 };
+
+TEST(Backend, TheExplicitLawReachesAnEngineAsHeldTorqueWithinTheEffort) {
+  Scene scene = wheel_scene();
+  scene.law = TorqueLaw::kExplicit;
+  Still backend(scene);
+  RobotState state = test::state_of(*scene.robot, Eigen::Vector3d::Zero());
+  state.q[0] = 0.1;
+  state.v[0] = 2.0;
+  backend.reset(state);
+  JointCommand command = test::no_torque(*scene.robot);
+  command.q_target[0] = 0.3;
+  command.kp[0] = 20.0;
+  command.kd[0] = 0.5;
+  command.tau_ff[0] = -1.0;
+  backend.step(command);
+  EXPECT_DOUBLE_EQ(backend.got.tau_ff[0], 20.0 * 0.2 - 0.5 * 2.0 - 1.0);
+  EXPECT_EQ(backend.got.kp[0] + backend.got.kd[0], 0.0);
+  const double largest = std::numeric_limits<double>::max();
+  for (const double kp : {1e6, largest}) {
+    command.kp[0] = kp;
+    command.kd[0] = kp == largest ? largest : 0.5;
+    backend.step(command);
+    EXPECT_LE(std::abs(backend.got.tau_ff[0]), scene.robot->joints[0].effort) << kp;
+  }
+  scene.law = TorqueLaw::kImplicit;
+  Still by_gains(scene);
+  by_gains.reset(state);
+  by_gains.step(command);
+  EXPECT_EQ(by_gains.got.kp[0], command.kp[0]);
+}
+
+TEST(Backend, WithArmatureScalesTheCardsAndLeavesTheRobotItself) {
+  const std::shared_ptr<const RobotModel> robot = test::wheel();
+  EXPECT_EQ(with_armature(robot, 1.0), robot);
+  EXPECT_EQ(with_armature(robot, 0.25)->joints[0].armature, 0.25 * robot->joints[0].armature);
+  for (const double share : {-0.1, 1.1, kNan})
+    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { with_armature(robot, share); }), HasSubstr("in [0, 1]"));
+}
 
 TEST(Backend, RefusesASceneWithoutRobot) {
   EXPECT_THAT(refused_scene([](Scene& s) { s.robot = nullptr; }), HasSubstr("no robot"));

@@ -250,7 +250,8 @@ TEST(Runner, PerturbedEpisodesDifferFromCleanAndRepeat) {
   suite.engines = {"mujoco"};
   suite.controllers = {SuiteController{"vmc"}};
   suite.start = SuiteStart::kAct;
-  for (const char* kind : {"delay", "latency", "noise", "push", "friction", "mass"})  // of the body; replay is blind
+  for (const char* kind :
+       {"delay", "latency", "noise", "push", "friction", "mass", "actuation"})  // of the body; replay is blind
     suite.perturbations.push_back(default_perturbation(kind));
   suite.perturbations[4] = test::perturbation("{push: {every: 1.5}}");  // within the clip
   const auto experiment = test::experiment_of(suite, {test::paired(Task::kWave, *test::g1())});
@@ -267,6 +268,25 @@ TEST(Runner, PerturbedEpisodesDifferFromCleanAndRepeat) {
     if (perturbation.name != "push") continue;
     EXPECT_EQ(experiment->run(spec).state_hash, row.state_hash);
   }
+}
+
+TEST(Experiment, SceneHasThePerturbationsActuationAndElseTheProfiles) {
+  Suite suite = test::playback_suite();
+  suite.engines = {"mujoco"};
+  suite.profile.engines["mujoco"] = {.dt = 0.004, .options = {}, .law = TorqueLaw::kExplicit, .armature = 0.5};
+  suite.perturbations.push_back(test::perturbation("{actuation: {armature: 0, dt: 0.001}}"));
+  const auto experiment = test::experiment_of(suite, {test::paired(Task::kWave, *test::g1())});
+  EpisodeSpec spec = test::first_of(*experiment);
+  const Scene clean = experiment->scene(spec);
+  EXPECT_EQ(clean.dt, 0.004);
+  EXPECT_EQ(clean.law, TorqueLaw::kExplicit);
+  EXPECT_EQ(clean.robot->joints[0].armature, 0.5 * test::g1()->joints[0].armature);
+  spec.perturbation = &experiment->suite().perturbations.back();
+  const Scene perturbed = experiment->scene(spec);
+  EXPECT_EQ(perturbed.dt, 0.001);
+  EXPECT_EQ(perturbed.law, TorqueLaw::kExplicit);
+  for (const RobotJoint& joint : perturbed.robot->joints) EXPECT_EQ(joint.armature, 0.0);
+  EXPECT_EQ(spec.body->robot->joints[0].armature, test::g1()->joints[0].armature);  // the controller's
 }
 
 TEST(Parallel, EveryIndexOnceAndTheFirstExceptionComesBack) {

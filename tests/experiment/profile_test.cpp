@@ -22,6 +22,16 @@ std::string refusal(const std::string& yaml) {
   return thrown_message<InputError>([&] { read_profile(parse_yaml(yaml, "p.yaml"), "p.yaml"); });
 }
 
+constexpr const char* kSuite = R"(
+schema: duet.suite/1
+name: s
+version: 1.0.0
+clips: {synth: {per_task: 1}}
+engines: [mujoco, ode]
+controllers: [vmc]
+policies: [replay]
+)";
+
 TEST(Profile, TheShippedOnesNameEveryEngineAndLoad) {
   const std::vector<std::string> names = profile_names();
   for (const char* name : {"parity", "fast", "accurate"}) {
@@ -72,15 +82,36 @@ TEST(Profile, TheDigestIsOfWhatHoldsNotOfWhatIsWritten) {
   }
 }
 
-constexpr const char* kSuite = R"(
-schema: duet.suite/1
-name: s
-version: 1.0.0
-clips: {synth: {per_task: 1}}
-engines: [mujoco, ode]
-controllers: [vmc]
-policies: [replay]
-)";
+TEST(Profile, LawAndArmatureAreReadHashedAndWrittenWhereTheyAreNotTheCards) {
+  const Profile profile = read_profile(
+      parse_yaml("name: p\nengines:\n  ode: {dt: 0.001, law: explicit, armature: 0.5}\n", "p.yaml"), "p.yaml");
+  const EngineSettings settings = profile.settings("ode");
+  EXPECT_EQ(settings.law, TorqueLaw::kExplicit);
+  EXPECT_EQ(settings.armature, 0.5);
+  EXPECT_EQ(settings_yaml(settings), "{dt: 0.001, law: explicit, armature: 0.5}");
+  EXPECT_EQ(settings_yaml({}), "{dt: 0.002}");
+  EngineSettings plain;
+  plain.dt = 0.001;
+  EXPECT_NE(settings_digest("ode", settings), settings_digest("ode", plain));
+}
+
+TEST(Profile, ALawOrAnArmatureThatCannotBeIsRefused) {
+  EXPECT_THAT(refusal("name: p\nengines:\n  ode: {law: implict}\n"),
+              AllOf(HasSubstr("p.yaml:3"), HasSubstr("ode: "), HasSubstr("'implict'"), HasSubstr("'implicit'")));
+  EXPECT_THAT(refusal("name: p\nengines:\n  ode: {armature: 2}\n"),
+              AllOf(HasSubstr("armature: expected"), HasSubstr("found 2")));
+}
+
+TEST(Profile, LawAndArmatureOfASuiteAreThoseOfAllItsEngines) {
+  const Suite suite = parse_suite(std::string(kSuite) + "law: explicit\narmature: 0\n", "s.yaml");
+  for (const char* engine : {"mujoco", "bullet", "ode", "simbody", "dart"}) {
+    EXPECT_EQ(suite.profile.settings(engine).law, TorqueLaw::kExplicit);
+    EXPECT_EQ(suite.profile.settings(engine).armature, 0.0);
+    EXPECT_EQ(suite.profile.settings(engine).options, load_profile("parity").settings(engine).options);
+  }
+  EXPECT_EQ(suite_hash(parse_suite(resolved_yaml(suite), "again.yaml")), suite_hash(suite));
+  EXPECT_NE(suite_hash(suite), suite_hash(parse_suite(kSuite, "s.yaml")));
+}
 
 TEST(Profile, OfASuiteReadsBackFromItsResolvedText) {
   const Suite suite = parse_suite(std::string(kSuite) + "profile: fast\n", "s.yaml");

@@ -61,11 +61,23 @@ TEST(Perturbation, ValuesAndCombinationsAreRead) {
   EXPECT_THAT(to_yaml(list[3]), HasSubstr("mass: {add: -1.5}"));
 }
 
+TEST(Perturbation, ActuationNamesWhatDiffersFromTheProfile) {
+  const std::vector<Perturbation> list = read("[actuation, {name: held, actuation: {law: explicit}}]");
+  EXPECT_EQ(to_yaml(list[0]), "{name: actuation, actuation: {law: explicit, armature: 0, dt: 0.001}}");
+  EXPECT_EQ(to_yaml(list[1]), "{name: held, actuation: {law: explicit}}");
+  EXPECT_FALSE(list[1].actuation->armature || list[1].actuation->dt);
+  EXPECT_EQ(tags_of(list[1]).at(kKindsTag), "actuation");
+  EXPECT_THAT(refusal("[{actuation: {law: implict}}]"), HasSubstr("'implicit'"));
+  EXPECT_THAT(refusal("[{actuation: {armature: 1.5}}]"), HasSubstr("expected a number from 0, at most 1, found 1.5"));
+  EXPECT_THAT(refusal("[{actuation: {dt: 0.003}}]"), HasSubstr("divides 0.02, found 0.003"));
+}
+
 TEST(Perturbation, WrittenOutItReadsBackToTheSame) {
   for (const char* text : {"clean", "push",
                            "{name: all, delay: {ticks: 3}, latency: {ms: 12.5}, noise: {w: 0.1}, "
                            "push: {force: 7}, friction: 1.2, mass: {link: pelvis, add: 2}, plan_latency: {ms: 60}}",
-                           "{name: k, kick: {speed: 1, first: 0.5, from: 2, to: 2.5}}"}) {
+                           "{name: k, kick: {speed: 1, first: 0.5, from: 2, to: 2.5}}",
+                           "{name: a, actuation: {law: explicit, armature: 0.5, dt: 0.0005}}"}) {
     const std::string once = to_yaml(read(std::string("[") + text + "]")[0]);
     EXPECT_EQ(to_yaml(read("[" + once + "]")[0]), once);
   }

@@ -2,6 +2,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ctime>
 #include <filesystem>
 
@@ -54,6 +55,8 @@ std::vector<conformance::EngineReport> run_scenes(const ValidateArguments& argum
         .version = engine_module(name).version(),
         .settings = {.dt = settings.dt,
                      .options = settings.options,
+                     .law = settings.law,
+                     .armature = settings.armature,
                      .effort = arguments.effort == "full" ? conformance::Effort::kFull : conformance::Effort::kQuick,
                      .robot = robot},
         .scenes = {}};
@@ -88,10 +91,19 @@ std::string engine_table(const CertifiedEngine& engine, bool all) {
   return table.rows.empty() ? "" : fmt::format("\n{}\n", markdown_table(table));
 }
 
+// " (38 hang on the torque law and the armature)": how many of the failed checks are of the law's group.
+std::string failed_by_law(const CertifiedEngine& engine) {
+  const auto count = std::ranges::count_if(engine.measurements, [](const CertifiedMeasurement& entry) {
+    return entry.verdict == conformance::CheckStatus::kFail &&
+           conformance::find_scene(entry.found.scene).group == conformance::kLawGroup;
+  });
+  return count == 0 ? "" : fmt::format(" ({} hang on the torque law and the armature)", count);
+}
+
 std::string summary(const CertifiedEngine& engine) {
-  return fmt::format("{} {} ({}, {:g} ms): {} passed, {} asserted deviation{}, {} failed\n", engine.name,
+  return fmt::format("{} {} ({}, {:g} ms): {} passed, {} asserted deviation{}, {} failed{}\n", engine.name,
                      engine.version, engine.profile, 1e3 * engine.dt, engine.tally.passed, engine.tally.deviations,
-                     engine.tally.deviations == 1 ? "" : "s", engine.tally.failed);
+                     engine.tally.deviations == 1 ? "" : "s", engine.tally.failed, failed_by_law(engine));
 }
 
 // Scenes that the robot lacks something for, each once.

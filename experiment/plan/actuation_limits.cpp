@@ -1,0 +1,79 @@
+#include "duet/experiment/plan/actuation_limits.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "duet/backends/actuation.h"
+#include "duet/rows/episode_row.h"
+
+namespace duet {
+namespace {
+
+ExplicitStep step_with(const std::shared_ptr<const RobotModel>& robot, const JointGains& gains, double armature) {
+  const std::shared_ptr<const RobotModel> driven = with_armature(robot, armature);
+  return largest_explicit_step(*driven, driven->standing_state(), gains);
+}
+
+std::string joint_of(const RobotModel& robot, const ExplicitStep& step) {
+  return step.joint < 0 ? "" : robot.joints[step.joint].name;
+}
+
+std::string step_text(const ExplicitStep& step, const std::string& joint) {
+  return std::isfinite(step.largest) ? fmt::format("{:.2g} ms ({})", 1e3 * step.largest, joint) : "any step";
+}
+
+std::string armature_text(double share) {
+  if (share == 0.0) return "without armature";
+  return share == 1.0 ? "with the card's armature" : fmt::format("with {:g} of the card's armature", share);
+}
+
+}  // namespace
+
+EngineSettings settings_under(const Perturbation& perturbation, EngineSettings settings) {
+  if (!perturbation.actuation) return settings;
+  settings.law = perturbation.actuation->law.value_or(settings.law);
+  settings.armature = perturbation.actuation->armature.value_or(settings.armature);
+  settings.dt = perturbation.actuation->dt.value_or(settings.dt);
+  return settings;
+}
+
+ActuationLimits actuation_limits(const std::shared_ptr<const RobotModel>& robot, const JointGains& gains) {
+  ActuationLimits limits{.robot = robot->name,
+                         .with_armature = step_with(robot, gains, 1.0),
+                         .bare = step_with(robot, gains, 0.0),
+                         .joint_with_armature = "",
+                         .joint_bare = ""};
+  limits.joint_with_armature = joint_of(*robot, limits.with_armature);
+  limits.joint_bare = joint_of(*robot, limits.bare);
+  return limits;
+}
+
+std::string to_text(const ActuationLimits& limits) {
+  return fmt::format("{} with the card's armature, {} without",
+                     step_text(limits.with_armature, limits.joint_with_armature),
+                     step_text(limits.bare, limits.joint_bare));
+}
+
+std::vector<std::string> actuation_notes(const Suite& suite, const std::string& controller,
+                                         const std::shared_ptr<const RobotModel>& robot, const JointGains& gains) {
+  std::vector<std::string> notes;
+  for (const Perturbation& perturbation : suite.perturbations)
+    for (const std::string& engine : suite.engines) {
+      if (engine == kPlaybackEngine) continue;
+      const EngineSettings settings = settings_under(perturbation, suite.profile.settings(engine));
+      if (settings.law != TorqueLaw::kExplicit) continue;
+      const ExplicitStep step = step_with(robot, gains, settings.armature);
+      if (settings.dt <= step.largest) continue;
+      std::string note = fmt::format(
+          "controller '{}', arm '{}': the explicit law at {:g} ms {} shakes {} of {} whatever the policy does; below "
+          "{:.2g} ms it would not",
+          controller, perturbation.name, 1e3 * settings.dt, armature_text(settings.armature), joint_of(*robot, step),
+          robot->name, 1e3 * step.largest);
+      if (std::ranges::find(notes, note) == notes.end()) notes.push_back(std::move(note));
+    }
+  return notes;
+}
+
+}  // namespace duet
