@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "duet/app/benchmarks/benchmark.h"
@@ -15,6 +16,7 @@
 #include "duet/controllers/controller.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/experiment/plan/actuation_limits.h"
 #include "duet/experiment/plan/shipped_suites.h"
 #include "duet/experiment/suite/profile.h"
 #include "duet/experiment/suite_file/suite_key.h"
@@ -242,6 +244,37 @@ std::vector<Listed> list_controllers() {
   return list;
 }
 
+nlohmann::json step_json(const ExplicitStep& step, const std::string& joint) {
+  return {{"joint", joint}, {"largest_step_s", std::isfinite(step.largest) ? nlohmann::json(step.largest) : nullptr}};
+}
+
+Listed stability_on(const ControllerInfo& info, const std::string& card) {
+  const std::shared_ptr<const RobotModel> robot = load_shared_robot(card);
+  Listed entry{info.name + " on " + robot->name, "", {}, {{"controller", info.name}, {"robot", robot->name}}};
+  try {
+    const ActuationLimits limits = actuation_limits(robot, standing_gains(info.name, robot));
+    entry.detail = to_text(limits);
+    entry.more["with_armature"] = step_json(limits.with_armature, limits.joint_with_armature);
+    entry.more["bare"] = step_json(limits.bare, limits.joint_bare);
+  } catch (const MissingError& error) {
+    entry.detail = fmt::format("not known: {}", error.what());
+  }
+  return entry;
+}
+
+// The largest step of the explicit law for each controller on its robot; for one of any robot, on those that ship.
+std::vector<Listed> list_stability() {
+  std::vector<Listed> list;
+  for (const ControllerInfo& info : controllers()) {
+    if (!info.robot.empty()) {
+      list.push_back(stability_on(info, info.robot));
+      continue;
+    }
+    for (const RobotCardFile& card : robot_cards()) list.push_back(stability_on(info, card.path));
+  }
+  return list;
+}
+
 std::vector<Listed> list_perturbations() {
   std::vector<Listed> list = {{kCleanName, "nothing is disturbed"}};
   for (const PerturbationKind& kind : perturbation_kind_table()) {
@@ -331,22 +364,25 @@ Listing listing_of(const ListPlace& place) {
   return in_parts(&Part::lists, place.name);
 }
 
+void print_list(const Session& session, const std::vector<Listed>& list) {
+  nlohmann::json json = nlohmann::json::array();
+  std::string text;
+  for (const Listed& entry : list) {
+    json.push_back({{"name", entry.name}, {"detail", entry.detail}});
+    if (!entry.options.empty()) json.back()["options"] = entry.options;
+    if (!entry.more.is_null()) json.back().update(entry.more);
+    text += entry.detail.empty() ? entry.name + "\n" : fmt::format("{:<32} {}\n", entry.name, entry.detail);
+    for (const std::string& option : entry.options) text += fmt::format("{:<34} {}\n", "", option);
+  }
+  print(session, text, json);
+}
+
 void run_list(const Session& session, const std::string& what) {
   for (const ListPlace& place : list_places()) {
     if (place.name != what) continue;
     const Listing listing = listing_of(place);
     if (!listing) throw MissingError(missing_part_message(fmt::format("`duet list {}`", what), place.part));
-    nlohmann::json json = nlohmann::json::array();
-    std::string text;
-    for (const Listed& entry : listing()) {
-      json.push_back({{"name", entry.name}, {"detail", entry.detail}});
-      if (!entry.options.empty()) json.back()["options"] = entry.options;
-      if (!entry.more.is_null()) json.back().update(entry.more);
-      text += entry.detail.empty() ? entry.name + "\n" : fmt::format("{:<32} {}\n", entry.name, entry.detail);
-      for (const std::string& option : entry.options) text += fmt::format("{:<34} {}\n", "", option);
-    }
-    print(session, text, json);
-    return;
+    return print_list(session, listing());
   }
   throw std::invalid_argument(unknown_name_message("list", what, listing_names()));
 }
@@ -367,7 +403,13 @@ void add_list(CLI::App& app, Session& session) {
   auto markdown = std::make_shared<bool>(false);
   command->add_flag("--markdown", *markdown,
                     fmt::format("as a page of docs/reference: {}", fmt::join(reference_page_names(), ", ")));
-  command->callback([&session, what, markdown] {
+  auto stability = std::make_shared<bool>(false);
+  command->add_flag(
+      "--stability", *stability,
+      "of controllers: the largest step of the explicit torque law for each robot, and the joint that sets it");
+  command->callback([&session, what, markdown, stability] {
+    require(!*stability || *what == "controllers", "--stability: expected `duet list controllers`, found '{}'", *what);
+    if (*stability) return print_list(session, list_stability());
     if (*markdown) return print(session, reference_page(*what), {{"markdown", reference_page(*what)}});
     run_list(session, *what);
   });

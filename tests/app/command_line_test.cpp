@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -22,6 +23,7 @@ using test::Answer;
 using test::duet_program;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 
 TEST(CommandLine, EveryCommandHasHelpWithAnExample) {
@@ -215,6 +217,21 @@ TEST(CommandLine, ListSaysWhatControllersAndPerturbationsAre) {
   const Answer perturbations = duet_program("list perturbations");
   EXPECT_EQ(perturbations.code, 0) << perturbations.err;
   EXPECT_THAT(perturbations.out, HasSubstr("push: {force: 60, duration: 1, every: 4}"));
+}
+
+TEST(CommandLine, ListHasTheLargestExplicitStepOfEveryController) {
+  const Answer answer = duet_program("list controllers --stability --json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const nlohmann::json list = nlohmann::json::parse(answer.out);
+  std::map<std::string, const nlohmann::json*> by_name;
+  for (const nlohmann::json& entry : list) by_name[entry.at("name")] = &entry;
+  for (const char* name : {"pd on g1", "wbc_sim on g1", "holosoma on g1", "rl_gym on g1_12dof", "holosoma_t1 on t1"}) {
+    ASSERT_TRUE(by_name.contains(name)) << answer.out;
+    const nlohmann::json& entry = *by_name[name];
+    EXPECT_LT(entry.at("bare").at("largest_step_s"), entry.at("with_armature").at("largest_step_s")) << name;
+    EXPECT_THAT(entry.at("bare").at("joint").get<std::string>(), Not(IsEmpty())) << name;
+  }
+  EXPECT_THAT(duet_program("list tasks --stability").err, HasSubstr("expected `duet list controllers`, found 'tasks'"));
 }
 
 TEST(CommandLine, DoctorSaysWhichControllersCanRun) {
