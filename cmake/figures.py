@@ -122,13 +122,16 @@ def rule(folder):
     return markdown(header, [False] + [True] * 13, table)
 
 
-def judged(folder):
-    """Rows of a run with the verdict of the rule `interaction`."""
+def rows_in(folder):
     path = ROOT / folder / "episodes.jsonl"
     if not path.is_file():
         raise Refused(f"no file {folder}/episodes.jsonl")
-    rows = [json.loads(line) for line in path.read_text().splitlines()]
-    return [(row, next(v for v in row["verdicts"] if v["version"] == "interaction")) for row in rows]
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def judged(folder):
+    """Rows of a run with the verdict of the rule `interaction`."""
+    return [(row, next(v for v in row["verdicts"] if v["version"] == "interaction")) for row in rows_in(folder)]
 
 
 def conditions(folder):
@@ -179,6 +182,41 @@ def engines(folder):
     return markdown(["Policy", *ENGINES.values(), "mean"], [False] + [True] * 6, table)
 
 
+def arms_of(folder):
+    """Arms of a run's suite in its order, as its rows name them."""
+    names = re.findall(r"(?m)^  - (?:\{name: )?(\w+)", (ROOT / folder / "suite.yaml").read_text().split("perturbations:", 1)[1])
+    ran = {row["perturbation"] for row in rows_in(folder)}
+    return [name for name in names if name in ran]
+
+
+def actuation(folder):
+    """Success in % and falls of each policy in each engine, by arm."""
+    rows, table = [row for row in rows_in(folder) if row["arm"] == "main"], []
+    for policy, name in policies_and_controls({row["policy"] for row in rows}).items():
+        for arm in arms_of(folder):
+            line = [name, f"`{arm}`"]
+            for engine in ENGINES:
+                some = [r for r in rows if (r["policy"], r["perturbation"], r["engine"]) == (policy, arm, engine)]
+                if some:
+                    won = sum(bool(r["success"]) for r in some)
+                    line.append(f"{short(won / len(some))} [{', '.join(wilson(won, len(some)))}]; {sum(r['fell'] for r in some)}/{len(some)}")
+            table.append(line)
+    return markdown(["Policy", "arm", *[f"{name}: success; fell" for name in ENGINES.values()]], [False] * 2 + [True] * 5, table)
+
+
+def actuation_walkers(folder, program):
+    """In how many engines each walker fell, by arm, beside the largest step of the explicit law that the program foretells."""
+    steps = {one["controller"]: one for one in json.loads(output([program, "list", "controllers", "--stability", "--json"]))}
+    rows, arms, table = [row for row in rows_in(folder) if row["outcome"] != "unsupported"], arms_of(folder), []
+    for controller in dict.fromkeys(row["controller"] for row in rows):
+        line = [f"`{controller}`", *[f"{1e3 * steps[controller][key]['largest_step_s']:.2g} ms" for key in ("with_armature", "bare")]]
+        for arm in arms:
+            some = [row for row in rows if (row["controller"], row["perturbation"]) == (controller, arm)]
+            line.append(f"{sum(row['fell'] for row in some)}/{len(some)}")
+        table.append(line)
+    return markdown(["walker", "bound", "bound, bare", *[f"`{arm}`" for arm in arms]], [False] + [True] * (2 + len(arms)), table)
+
+
 def suites(program):
     """The suites that ship, what each asks, and whether its rows are published."""
     found = json.loads(output([program, "list", "suites", "--json"]))
@@ -204,10 +242,13 @@ def contents(source, program):
     if words[:1] == ["duet"]:
         lines = output([program, *words[1:]]).rstrip("\n").split("\n")
         return lines if any(line.startswith("|") for line in lines) else ["```", *lines, "```"]
-    tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures}
+    if words[:1] == ["actuation_walkers"] and len(words) == 2:
+        return actuation_walkers(words[1], program)
+    tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
+              "actuation": actuation}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, pictures FILE, suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, pictures FILE, actuation RUN, actuation_walkers RUN, suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):
