@@ -35,7 +35,11 @@ std::vector<OptionSection> sections_of(const std::vector<Info>& infos) {
 
 }  // namespace
 
-std::vector<OptionSection> controller_option_sections() { return sections_of(controllers()); }
+std::vector<OptionSection> controller_option_sections() {
+  std::vector<OptionSection> sections = sections_of(controllers());
+  sections.push_back({"every controller", rows_of(common_controller_options())});
+  return sections;
+}
 
 std::vector<OptionSection> policy_option_sections() {
   std::vector<OptionSection> sections = sections_of(policies());

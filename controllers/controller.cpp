@@ -98,7 +98,29 @@ class Guard final : public Controller {
   int stop_ticks_ = 0;
 };
 
+class DampedAtMost final : public Controller {
+ public:
+  DampedAtMost(std::unique_ptr<Controller> controller, Eigen::VectorXd most)
+      : controller_(std::move(controller)), most_(std::move(most)) {}
+
+  [[nodiscard]] std::string_view name() const override { return controller_->name(); }
+  [[nodiscard]] ControllerFaults faults() const override { return controller_->faults(); }
+  void reset(const RobotState& state) override { controller_->reset(state); }
+  void act(const RobotState& state, const Reference& reference, JointCommand& command) override {
+    controller_->act(state, reference, command);
+    command.kd = command.kd.cwiseMin(most_);
+  }
+
+ private:
+  std::unique_ptr<Controller> controller_;
+  Eigen::VectorXd most_;
+};
+
 }  // namespace
+
+std::unique_ptr<Controller> make_damped_at_most(std::unique_ptr<Controller> controller, Eigen::VectorXd most) {
+  return std::make_unique<DampedAtMost>(std::move(controller), std::move(most));
+}
 
 std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
                                          const std::shared_ptr<const RobotModel>& robot) {

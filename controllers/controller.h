@@ -57,6 +57,9 @@ inline constexpr int kGuardRampTicks = 25;
 std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
                                          const std::shared_ptr<const RobotModel>& robot);
 
+// With kd at most `most` [N m s/rad], one per joint; all else is `controller`'s. Wraps any controller.
+std::unique_ptr<Controller> make_damped_at_most(std::unique_ptr<Controller> controller, Eigen::VectorXd most);
+
 // The card's gains around the reference's joint angles and nothing else: no balance. It falls within about a second and
 // says so in the table; what stands longer is the other controllers' merit.
 std::unique_ptr<Controller> make_pd_controller(std::shared_ptr<const RobotModel> robot);

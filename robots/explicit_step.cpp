@@ -14,7 +14,9 @@ namespace {
 
 using SymmetricSolver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
-constexpr int kHalvings = 50;  // of the bracket of the step: to the last bits of a double
+constexpr double kLessDamping = 0.95;   // of a joint that oscillates
+constexpr double kLeastDamping = 0.01;  // of what was asked for
+constexpr int kHalvings = 50;           // of the bracket of the step: to the last bits of a double
 
 Eigen::MatrixXd joint_mobility(const RobotModel& robot, const RobotState& pose) {
   Eigen::MatrixXd mass(6 + robot.dof(), 6 + robot.dof());
@@ -63,6 +65,26 @@ ExplicitStep largest_explicit_step(const RobotModel& robot, const RobotState& po
 double largest_explicit_step_of(const RobotModel& robot, const RobotState& pose, const JointGains& gains, int joint) {
   check_gains(robot, gains);
   return single_joint_step(gains.kp[joint], gains.kd[joint], 1.0 / joint_mobility(robot, pose)(joint, joint));
+}
+
+JointGains gains_for_explicit_step(RobotModel robot, JointGains gains, double step) {
+  require(step > 0.0 && std::isfinite(step), "explicit step: expected a step above 0 s, found {:g}", step);
+  check_gains(robot, gains);
+  for (RobotJoint& joint : robot.joints) joint.armature = 0.0;
+  const Eigen::MatrixXd W = joint_mobility(robot, robot.standing_state());
+  const Eigen::VectorXd asked = gains.kd;
+  while (true) {
+    const SymmetricSolver solver(shaken(W, gains, 2.0 * step));
+    if (solver.eigenvalues().tail<1>()[0] <= 1.0) return gains;
+    int joint = 0;
+    solver.eigenvectors().rightCols<1>().cwiseAbs().maxCoeff(&joint);
+    require(gains.kd[joint] > kLeastDamping * asked[joint],
+            "explicit step: {} of {} has a kp of {:g} N m/rad, which no damping makes hold at {:g} ms",
+            robot.joints[joint].name, robot.name, gains.kp[joint], 1e3 * step);
+    const int other = robot.roles.counterpart.empty() ? joint : robot.roles.counterpart[joint];
+    gains.kd[joint] *= kLessDamping;
+    if (other != joint) gains.kd[other] *= kLessDamping;
+  }
 }
 
 }  // namespace duet

@@ -29,4 +29,10 @@ ExplicitStep largest_explicit_step(const RobotModel& robot, const RobotState& po
 // The same at one joint that alone is held: I_j = 1 / (M^-1)_jj.
 double largest_explicit_step_of(const RobotModel& robot, const RobotState& pose, const JointGains& gains, int joint);
 
+// The gains with damping lowered, by a twentieth at a time at the joint that oscillates first and at its counterpart,
+// until the explicit law bears twice `step` on the robot without armature: then what oscillates at `step` decays. No kp
+// changes, and no kd that the law bears. Throws std::invalid_argument for a step that is not positive, for gains of
+// another robot's size, and where kp alone is too stiff for it, naming the joint.
+JointGains gains_for_explicit_step(RobotModel robot, JointGains gains, double step);
+
 }  // namespace duet

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "duet/controllers/controller.h"
 #include "duet/controllers/descriptor_controller.h"
 #include "duet/controllers/vmc.h"
 #include "duet/controllers/wbc_sim/wbc_sim.h"
+#include "duet/core/field.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -20,6 +22,45 @@ namespace duet {
 namespace {
 
 using Robot = std::shared_ptr<const RobotModel>;
+
+// What every controller takes beside its own options.
+struct CommonOptions {
+  double explicit_step = 0.0;  // 0: as the controller has it
+};
+
+const FieldTable<CommonOptions>& common_table() {
+  static const FieldTable<CommonOptions> table = {
+      field<CommonOptions>({.name = "explicit_step",
+                            .meaning = "physics step [s] at which an explicit PD law without rotor inertia has to "
+                                       "hold: lowers kd of the joints that would shake there (0: none)",
+                            .range = {0.0, 0.02}},
+                           &CommonOptions::explicit_step)};
+  return table;
+}
+
+// Those of `options` that are the controller's own, or those that are not.
+ControllerOptions part_of(const ControllerOptions& options, bool own) {
+  ControllerOptions part;
+  for (const auto& [name, value] : options)
+    if ((find_field(common_table(), name) == nullptr) == own) part[name] = value;
+  return part;
+}
+
+LoadedController damped_for(double step, LoadedController loaded, const RobotModel& robot,
+                            const ControllerOptions& options) {
+  const JointGains gains = standing_gains(*loaded.make(options), robot);
+  Eigen::VectorXd most = gains_for_explicit_step(robot, gains, step).kd;
+  for (int j = 0; j < robot.dof(); ++j)
+    if (most[j] < gains.kd[j])
+      loaded.notes.push_back(fmt::format("kd of {}: {:.3g} in the place of {:.3g} N m s/rad (explicit_step {:g} s)",
+                                         robot.joints[j].name, most[j], gains.kd[j], step));
+    else
+      most[j] = std::numeric_limits<double>::infinity();
+  loaded.make = [make = loaded.make, most = std::move(most)](const ControllerOptions& now) {
+    return make_damped_at_most(make(now), most);
+  };
+  return loaded;
+}
 
 // A controller by name: what is said of it, and how it is made once its options are known to be its own.
 struct Entry {
@@ -149,8 +190,11 @@ LoadedFiles controller_files(const std::string& name, const ControllerOptions& o
 void check_controller_options(const ControllerInfo& info, const ControllerOptions& options) {
   std::vector<std::string> known;
   for (const ControllerOption& option : info.options) known.push_back(option.name);
+  for (const ControllerOption& option : common_controller_options()) known.push_back(option.name);
   check_options("controller", info.name, options, known);
 }
+
+std::vector<ControllerOption> common_controller_options() { return option_list<ControllerOption>(common_table()); }
 
 std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
                                             const ControllerOptions& options) {
@@ -162,9 +206,13 @@ LoadedController load_controller(const std::string& name, const std::shared_ptr<
   require(robot != nullptr, "make_controller: no robot");
   const Entry& entry = find_entry(name);
   check_controller_options(entry.info(name), options);
-  const LoadedController loaded = entry.load(name, robot, options);
-  return {[robot, make = loaded.make](const ControllerOptions& now) { return make_guarded(make(now), robot); },
-          loaded.notes};
+  const CommonOptions common = read_options("controller", name, common_table(), part_of(options, false));
+  const LoadedController loaded = entry.load(name, robot, part_of(options, true));
+  LoadedController guarded = {[robot, make = loaded.make](const ControllerOptions& now) {
+                                return make_guarded(make(part_of(now, true)), robot);
+                              },
+                              loaded.notes};
+  return common.explicit_step == 0.0 ? guarded : damped_for(common.explicit_step, std::move(guarded), *robot, options);
 }
 
 namespace {

@@ -23,6 +23,8 @@ ControllerInfo controller_info(const std::string& name);
 // Every file that such a controller loads, its card aside, in a fixed order. Throws as make_controller for a name that
 // is unknown, a descriptor that is broken and a network that is not on this machine; the files are not read.
 LoadedFiles controller_files(const std::string& name, const ControllerOptions& options = {});
+// Options that every controller has beside its own.
+std::vector<ControllerOption> common_controller_options();
 // Throws std::invalid_argument for an option that it does not have, with the nearest and all known.
 void check_controller_options(const ControllerInfo& info, const ControllerOptions& options);
 

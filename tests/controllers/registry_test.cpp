@@ -8,6 +8,7 @@
 
 #include "duet/core/require.h"
 #include "tests/backends/g1_scene.h"
+#include "tests/controllers/fake_network.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -107,6 +108,24 @@ TEST(AddedController, IsGuardedAsThoseThatShip) {
 }
 TEST(AddedController, TakesNoNameThatIsThere) {
   EXPECT_EXIT(end_with(takes_no_name_twice), ::testing::ExitedWithCode(0), "");
+}
+
+TEST(ExplicitStepOption, LowersTheDampingThatWouldShake) {
+  const auto robot = test::body("g1");
+  const JointGains asked = standing_gains("pd", robot),
+                   light = standing_gains("pd", robot, {{"explicit_step", "0.001"}});
+  EXPECT_EQ(light.kp, asked.kp);
+  const int ankle = robot->joint_index("left_ankle_roll_joint"), knee = robot->joint_index("left_knee_joint");
+  EXPECT_LT(light.kd[ankle], 0.3 * asked.kd[ankle]);
+  EXPECT_EQ(light.kd[knee], asked.kd[knee]);
+  const LoadedController loaded = load_controller("pd", robot, {{"explicit_step", "0.001"}});
+  ASSERT_FALSE(loaded.notes.empty());
+  EXPECT_THAT(loaded.notes.front(), HasSubstr("kd of left_ankle_roll_joint: "));
+  EXPECT_TRUE(load_controller("pd", robot, {{"explicit_step", "0"}}).notes.empty());
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] {
+                static_cast<void>(load_controller("pd", robot, {{"explicit_step", "soon"}}));
+              }),
+              HasSubstr("controller 'pd': "));
 }
 
 }  // namespace

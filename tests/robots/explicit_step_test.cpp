@@ -86,6 +86,33 @@ TEST(ExplicitStep, OfTheG1AreThoseOfItsSmallestInertias) {
   }
 }
 
+TEST(GainsForExplicitStep, LowerOnlyWhatWouldShake) {
+  const RobotModel robot = g1();
+  const JointGains asked = card_gains(robot), gains = gains_for_explicit_step(robot, asked, 0.001);
+  EXPECT_EQ(gains.kp, asked.kp);
+  EXPECT_GE(largest_explicit_step(bare(robot), robot.standing_state(), gains).largest, 0.002);
+  for (int j = 0; j < robot.dof(); ++j) {
+    const bool shakes = robot.joints[j].name.find("ankle_roll") != std::string::npos ||
+                        robot.joints[j].name.find("wrist_roll") != std::string::npos;
+    if (shakes)
+      EXPECT_LT(gains.kd[j], 0.5 * asked.kd[j]) << robot.joints[j].name;
+    else
+      EXPECT_GE(gains.kd[j], 0.7 * asked.kd[j]) << robot.joints[j].name;
+    EXPECT_EQ(gains.kd[j], gains.kd[robot.roles.counterpart[j]]);
+  }
+  EXPECT_EQ(gains_for_explicit_step(robot, asked, 1e-5).kd, asked.kd);
+}
+
+TEST(GainsForExplicitStep, RefuseAStiffnessThatNoDampingHolds) {
+  const RobotModel robot = g1();
+  const auto said = [&](double step) {
+    return test::thrown_message<std::invalid_argument>(
+        [&] { gains_for_explicit_step(robot, card_gains(robot), step); });
+  };
+  EXPECT_THAT(said(0.02), ::testing::HasSubstr("which no damping makes hold at 20 ms"));
+  EXPECT_THAT(said(0.0), ::testing::HasSubstr("expected a step above 0 s, found 0"));
+}
+
 TEST(ExplicitStep, NoGainsShakeNothingAndOthersRobotsAreRefused) {
   const RobotModel& robot = g1();
   const ExplicitStep none = largest_explicit_step(robot, robot.standing_state(), no_gains(robot));
