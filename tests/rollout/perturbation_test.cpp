@@ -66,7 +66,7 @@ TEST(Perturbation, ActuationNamesWhatDiffersFromTheProfile) {
   EXPECT_EQ(to_yaml(list[0]), "{name: actuation, actuation: {law: explicit, armature: 0, dt: 0.001}}");
   EXPECT_EQ(to_yaml(list[1]), "{name: held, actuation: {law: explicit}}");
   EXPECT_FALSE(list[1].actuation->armature || list[1].actuation->dt);
-  EXPECT_EQ(tags_of(list[1]).at(kKindsTag), "actuation");
+  EXPECT_EQ(tags_of(list[1]).at(std::string(kKindsTag)), "actuation");
   EXPECT_THAT(refusal("[{actuation: {law: implict}}]"), HasSubstr("'implicit'"));
   EXPECT_THAT(refusal("[{actuation: {armature: 1.5}}]"), HasSubstr("expected a number from 0, at most 1, found 1.5"));
   EXPECT_THAT(refusal("[{actuation: {dt: 0.003}}]"), HasSubstr("divides 0.02, found 0.003"));
