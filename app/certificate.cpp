@@ -20,12 +20,6 @@ using nlohmann::json;
 
 constexpr const char* kSchema = "duet.certificate/1";
 
-void count(conformance::CheckStatus verdict, Tally& tally) {
-  if (verdict == conformance::CheckStatus::kPass) ++tally.passed;
-  if (verdict == conformance::CheckStatus::kFail) ++tally.failed;
-  if (verdict == conformance::CheckStatus::kDeviation) ++tally.deviations;
-}
-
 CertifiedEngine certified(const conformance::EngineReport& report, const std::string& profile) {
   CertifiedEngine engine{.name = report.engine,
                          .version = report.version,
@@ -70,11 +64,13 @@ json engine_json(const CertifiedEngine& engine) {
   json measurements = json::array(), accuracy = json::array();
   for (const CertifiedMeasurement& entry : engine.measurements) measurements.push_back(measurement_json(entry));
   for (const AccuracyCurve& curve : engine.accuracy) accuracy.push_back(curve_json(curve));
-  return {{"name", engine.name},           {"version", engine.version},
-          {"profile", engine.profile},     {"dt", engine.dt},
-          {"options", engine.options},     {"passed", engine.tally.passed},
-          {"failed", engine.tally.failed}, {"deviations", engine.tally.deviations},
-          {"measurements", measurements},  {"accuracy", accuracy}};
+  json object = {{"name", engine.name},           {"version", engine.version},
+                 {"profile", engine.profile},     {"dt", engine.dt},
+                 {"options", engine.options},     {"passed", engine.tally.passed},
+                 {"failed", engine.tally.failed}, {"deviations", engine.tally.deviations},
+                 {"measurements", measurements},  {"accuracy", accuracy}};
+  if (engine.tally.unsupported > 0) object["unsupported"] = engine.tally.unsupported;
+  return object;
 }
 
 json deviation_json(const CertifiedDeviation& entry) {
@@ -118,9 +114,11 @@ void read_list(JsonFields& fields, const std::string& key, const std::string& wh
 
 conformance::CheckStatus read_status(const std::string& text, const std::string& what) {
   for (const conformance::CheckStatus verdict :
-       {conformance::CheckStatus::kPass, conformance::CheckStatus::kFail, conformance::CheckStatus::kDeviation})
+       {conformance::CheckStatus::kPass, conformance::CheckStatus::kFail, conformance::CheckStatus::kDeviation,
+        conformance::CheckStatus::kUnsupported})
     if (text == conformance::to_string(verdict)) return verdict;
-  throw InputError(fmt::format("{}: verdict is '{}', expected pass, FAIL or deviation", what, excerpt(text)));
+  throw InputError(
+      fmt::format("{}: verdict is '{}', expected pass, FAIL, deviation or unsupported", what, excerpt(text)));
 }
 
 CertifiedMeasurement read_measurement(const json& object, const std::string& what) {
@@ -137,6 +135,7 @@ CertifiedMeasurement read_measurement(const json& object, const std::string& wha
   entry.found.across_engines = fields.boolean("across_engines");
   entry.found.note = fields.text("note");
   entry.verdict = read_status(fields.text("verdict"), what);
+  entry.found.unsupported = entry.verdict == conformance::CheckStatus::kUnsupported;
   fields.refuse_unknown();
   return entry;
 }
@@ -173,21 +172,23 @@ CertifiedEngine read_engine(const json& object, const std::string& what) {
   engine.options = read_options(fields.at("options"), what);
   engine.tally = {.passed = static_cast<int>(fields.integer("passed")),
                   .failed = static_cast<int>(fields.integer("failed")),
-                  .deviations = static_cast<int>(fields.integer("deviations"))};
+                  .deviations = static_cast<int>(fields.integer("deviations")),
+                  .unsupported = fields.has("unsupported") ? fields.count("unsupported") : 0};
   Tally counted;
   read_list(fields, "measurements", what, [&](const json& element, const std::string& place) {
     engine.measurements.push_back(read_measurement(element, place));
-    count(engine.measurements.back().verdict, counted);
+    counted.count(engine.measurements.back().verdict);
   });
   read_list(fields, "accuracy", what, [&](const json& element, const std::string& place) {
     engine.accuracy.push_back(read_curve(element, place));
   });
   fields.refuse_unknown();
-  if (counted.passed != engine.tally.passed || counted.failed != engine.tally.failed ||
-      counted.deviations != engine.tally.deviations)
-    throw InputError(fmt::format("{}: says {} passed, {} failed, {} deviations; its measurements are {}, {}, {}", what,
-                                 engine.tally.passed, engine.tally.failed, engine.tally.deviations, counted.passed,
-                                 counted.failed, counted.deviations));
+  if (counted != engine.tally)
+    throw InputError(
+        fmt::format("{}: says {} passed, {} failed, {} deviations, {} unsupported; its measurements are {}, "
+                    "{}, {}, {}",
+                    what, engine.tally.passed, engine.tally.failed, engine.tally.deviations, engine.tally.unsupported,
+                    counted.passed, counted.failed, counted.deviations, counted.unsupported));
   return engine;
 }
 

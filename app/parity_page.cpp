@@ -151,12 +151,13 @@ std::string section_html(const std::string& id, const TitledTable& titled) {
 
 std::string summary_html(const Certificate& certificate) {
   TitledTable titled{.title = "Engines"};
-  titled.table = {.header = {"Engine", "Version", "Profile", "Step [ms]", "Passed", "Asserted deviations", "Failed"},
-                  .label_columns = 3};
+  titled.table = {
+      .header = {"Engine", "Version", "Profile", "Step [ms]", "Passed", "Asserted deviations", "Failed", "Unsupported"},
+      .label_columns = 3};
   for (const CertifiedEngine& engine : certificate.engines)
     titled.table.rows.push_back({engine.name, engine.version, engine.profile, fmt::format("{:g}", 1e3 * engine.dt),
                                  fmt::format("{}", engine.tally.passed), fmt::format("{}", engine.tally.deviations),
-                                 fmt::format("{}", engine.tally.failed)});
+                                 fmt::format("{}", engine.tally.failed), fmt::format("{}", engine.tally.unsupported)});
   return section_html("engines", titled);
 }
 

@@ -145,9 +145,17 @@ const EngineModule* find_engine_module(const std::string& engine) {
   return std::ranges::find(names, engine) == names.end() ? nullptr : loaded(engine).module;
 }
 
+std::string refusal_of(const std::string& engine, PartnerMode partner) {
+  const EngineModule* module = find_engine_module(engine);
+  if (module == nullptr || partner != PartnerMode::kSolid || *module->no_solid_partner == '\0') return "";
+  return fmt::format("engine '{}' has no solid partner ({}): expected the partner ghost or none", engine,
+                     module->no_solid_partner);
+}
+
 std::unique_ptr<Backend> make_backend(const std::string& engine, const Scene& scene) {
   const EngineModule& module = engine_module(engine);
   check_options(engine, scene.options, module.options);
+  if (const std::string refusal = refusal_of(engine, scene.partner); !refusal.empty()) throw MissingError(refusal);
   return module.make(scene);
 }
 

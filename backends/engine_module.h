@@ -102,6 +102,31 @@ struct AfterBackend : Backend {
 
 }  // namespace engine_layout
 
+inline std::uint64_t engine_interface();
+
+struct EngineModule {
+  // Both are set by themselves; a module whose interface is not the program's is refused, and what stands behind these
+  // two members is then not looked at.
+  std::uint64_t interface = engine_interface();
+  const char* built_with = duet_version();
+  const char* name = "";
+  std::string (*version)() = nullptr;  // the engine's own
+  // Throws std::invalid_argument (scene, options) and std::runtime_error with the engine's message where it refuses.
+  std::unique_ptr<Backend> (*make)(const Scene& scene) = nullptr;
+  std::span<const EngineOption> options;  // what a profile may set
+  // The cost of the engine itself, against which the overhead of Backend::step is measured: CPU seconds for `steps`
+  // steps from `state` under `command`, by the least code that makes the same engine calls under the same torque law
+  // and reads the state back. Throws std::invalid_argument for steps < 1.
+  double (*bare_step_seconds)(const Scene& scene, const RobotState& state, const JointCommand& command,
+                              int steps) = nullptr;
+  // At most so long a step of the G1 standing on its feet is to take, under `duet bench` [us]; 0: nothing is asked.
+  double step_target_us = 0.0;
+  std::span<const EngineDeviation> deviations = {};
+  // Why the engine takes no PartnerMode::kSolid, part of a sentence ("nothing touches its robot"); "" where it does.
+  // make_backend refuses such a scene, and the conformance suite lists what needs it as unsupported.
+  const char* no_solid_partner = "";
+};
+
 inline std::uint64_t engine_interface() {
   engine_layout::Digest digest;
   digest.add_type<std::string>();
@@ -134,30 +159,13 @@ inline std::uint64_t engine_interface() {
                   &EngineOption::high, &EngineOption::whole, &EngineOption::meaning);
   digest.add_type(&EngineDeviation::scene, &EngineDeviation::quantity, &EngineDeviation::reason,
                   &EngineDeviation::bound, &EngineDeviation::only_at_full_effort);
+  digest.add_type(&EngineModule::name, &EngineModule::version, &EngineModule::make, &EngineModule::options,
+                  &EngineModule::bare_step_seconds, &EngineModule::step_target_us, &EngineModule::deviations,
+                  &EngineModule::no_solid_partner);
   digest.add_type<Backend>();
   digest.add(engine_layout::Digest::first_word(&engine_layout::AfterBackend::after));
   return digest.value();
 }
-
-struct EngineModule {
-  // Both are set by themselves; a module whose interface is not the program's is refused, and what stands behind these
-  // two members is then not looked at.
-  std::uint64_t interface = engine_interface();
-  const char* built_with = duet_version();
-  const char* name = "";
-  std::string (*version)() = nullptr;  // the engine's own
-  // Throws std::invalid_argument (scene, options) and std::runtime_error with the engine's message where it refuses.
-  std::unique_ptr<Backend> (*make)(const Scene& scene) = nullptr;
-  std::span<const EngineOption> options;  // what a profile may set
-  // The cost of the engine itself, against which the overhead of Backend::step is measured: CPU seconds for `steps`
-  // steps from `state` under `command`, by the least code that makes the same engine calls under the same torque law
-  // and reads the state back. Throws std::invalid_argument for steps < 1.
-  double (*bare_step_seconds)(const Scene& scene, const RobotState& state, const JointCommand& command,
-                              int steps) = nullptr;
-  // At most so long a step of the G1 standing on its feet is to take, under `duet bench` [us]; 0: nothing is asked.
-  double step_target_us = 0.0;
-  std::span<const EngineDeviation> deviations = {};
-};
 
 }  // namespace duet
 
@@ -185,11 +193,15 @@ struct EngineInfo {
 std::vector<EngineInfo> engines();
 
 // Throws std::invalid_argument for an unknown name (with the nearest), options that the engine does not have and a
-// scene that it refuses; MissingError for an engine that this machine lacks.
+// scene that it refuses; MissingError for an engine that this machine lacks, and for a solid partner in one that has
+// none.
 std::unique_ptr<Backend> make_backend(const std::string& engine, const Scene& scene);
 
 // Throws as make_backend.
 const EngineModule& engine_module(const std::string& engine);
+// Why the engine cannot take scenes with a partner of this mode, one sentence; "" where it can, and for an engine that
+// is not there.
+std::string refusal_of(const std::string& engine, PartnerMode partner);
 // Null where there is none of that name, or where this machine lacks it.
 const EngineModule* find_engine_module(const std::string& engine);
 

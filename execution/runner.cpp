@@ -39,16 +39,21 @@ bool plays_back(const std::vector<std::string>& engines, const RunOptions& optio
   return std::ranges::find(engines, kPlaybackEngine) != engines.end() && chosen(options.engines, kPlaybackEngine);
 }
 
-// Engines of the suite that this machine lacks, each with its reason. Throws MissingError where no other is left.
-std::map<std::string, std::string> absent_engines(const std::vector<std::string>& named, const RunOptions& options) {
+// Engines of the suite that this machine lacks, or that lack a solid partner where the suite has one, each with its
+// reason. Throws MissingError where no other is left.
+std::map<std::string, std::string> absent_engines(const Suite& suite, const RunOptions& options) {
+  const std::vector<std::string>& named = suite.engines;
   std::map<std::string, std::string> absent;
   int present = plays_back(named, options) ? 1 : 0;
   for (const EngineInfo& engine : engines()) {
     if (std::ranges::find(named, engine.name) == named.end() || !chosen(options.engines, engine.name)) continue;
-    if (engine.available)
-      ++present;
-    else
+    const std::string refusal = refusal_of(engine.name, suite.partner);
+    if (!engine.available)
       absent[engine.name] = fmt::format("engine '{}' is absent: {}", engine.name, engine.reason);
+    else if (!refusal.empty())
+      absent[engine.name] = refusal;
+    else
+      ++present;
   }
   if (present == 0 && !absent.empty()) throw MissingError(absent.begin()->second);
   return absent;
@@ -272,7 +277,7 @@ RunSummary run_suite(Suite suite, const std::string& directory, const RunOptions
   check_filters(part_of(options), suite);
   check_decision_of(options, suite.is_commanded());
   RunSummary summary;
-  summary.absent_engines = absent_engines(suite.engines, options);
+  summary.absent_engines = absent_engines(suite, options);
   ExperimentOptions loaded = only(part_of(options), suite);
   loaded.called = options.called;
   Experiment experiment(std::move(suite), std::move(loaded));

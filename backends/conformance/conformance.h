@@ -35,6 +35,7 @@ struct Measurement {
   bool relative = false;        // which of the two
   bool of_stand_in = true;      // on the robot that stands in, which bounds of deviations and stored figures are about
   bool across_engines = false;  // `expected` is the median of the engines that ran (agree), until then a stored figure
+  bool unsupported = false;     // the engine lacks what was to be measured; `note` says what
   std::string note;             // what `expected` is and what the tolerance stands for
 };
 
@@ -65,6 +66,7 @@ struct ConformanceScene {
   // with others fails here and nowhere else. "": it holds whatever drives the joints.
   std::string_view group = "";
   std::string (*lacks)(const RobotModel& robot) = nullptr;  // what the scene needs of the robot and it has not, or ""
+  bool with_partner = false;                                // cannot be run without a solid partner
 };
 
 inline constexpr std::string_view kLawGroup = "law";
@@ -73,14 +75,16 @@ std::span<const ConformanceScene> scenes();
 // Throws std::invalid_argument with the nearest and all known names.
 const ConformanceScene& find_scene(std::string_view name);
 
-// A robot that lacks what the scene needs is no fault: the run says what. An engine's exception, or its divergence,
-// becomes a failed measurement "ran to its end" with the message. Throws what make_backend throws for an engine's name
-// (unknown, absent).
+// A robot that lacks what the scene needs is no fault: the run says what. An engine that has no solid partner
+// (EngineModule::no_solid_partner) has one measurement, `unsupported`, in a scene that needs it. An engine's exception,
+// or its divergence, becomes a failed measurement "ran to its end" with the message. Throws what make_backend throws
+// for an engine's name (unknown, absent).
 SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, const Settings& settings);
 
-// kDeviation: outside its tolerance, inside the bound that its engine's module gives it.
-enum class CheckStatus { kPass, kFail, kDeviation };
-std::string_view to_string(CheckStatus verdict);  // "pass", "FAIL", "deviation"
+// kDeviation: outside its tolerance, inside the bound that its engine's module gives it. kUnsupported: not measured, as
+// the engine's module says that it lacks what the check needs.
+enum class CheckStatus { kPass, kFail, kDeviation, kUnsupported };
+std::string_view to_string(CheckStatus verdict);  // "pass", "FAIL", "deviation", "unsupported"
 
 CheckStatus status_of(const std::string& engine, const Measurement& measurement);
 
@@ -103,7 +107,10 @@ EngineReport run_suite(const std::string& engine, const Settings& settings, std:
 void agree(std::span<EngineReport> reports);
 
 struct Tally {
-  int passed = 0, failed = 0, deviations = 0;
+  int passed = 0, failed = 0, deviations = 0, unsupported = 0;
+
+  void count(CheckStatus verdict);
+  bool operator==(const Tally&) const = default;
 };
 Tally tally(const EngineReport& report);
 

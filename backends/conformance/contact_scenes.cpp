@@ -23,7 +23,8 @@ constexpr double kSkinStiffness = 25000.0;
 constexpr double kCapsuleHeight = 50.0;  // away from the ground
 
 struct Bounce {
-  double speed = 0.0, contact_time = 0.0, peak = 0.0, cost = 0.0;
+  double speed = 0.0;  // after, of the ball less that of the skin [m/s]
+  double contact_time = 0.0, peak = 0.0, cost = 0.0;
 };
 
 // The linearly implicit step on one unilateral spring and damper, which every engine has to make of a skin:
@@ -45,7 +46,8 @@ Bounce discrete_bounce(const ContactCompliance& skin, double dt) {
   return bounce;
 }
 
-Bounce bounce_in(const Trial& trial, const ContactCompliance& skin, double dt) {
+// `skin_speed`: of the capsule towards the ball, whose speed is the rest of kImpactSpeed [m/s].
+Bounce bounce_in(const Trial& trial, const ContactCompliance& skin, double dt, double skin_speed = 0.0) {
   Scene scene = trial.scene(ball(kMass, kRadius), dt);
   scene.gravity.setZero();
   scene.partner = PartnerMode::kSolid;
@@ -59,13 +61,15 @@ Bounce bounce_in(const Trial& trial, const ContactCompliance& skin, double dt) {
   scene.human.capsules = {capsule};
   World world(trial, scene);
   RobotState start = state_at(world.robot(), {0.0, 0.0, kCapsuleHeight});
-  start.v_WB.x() = -kImpactSpeed;
+  start.v_WB.x() = skin_speed - kImpactSpeed;
   world.reset(start);
   HumanJoints joints = HumanJoints::Zero();
   joints.colwise() = Eigen::Vector3d(-(kRadius + kCapsuleRadius + kGap), 0.0, kCapsuleHeight);
   joints(1, kLeftHip) = 0.5;
   joints(1, kRightHip) = -0.5;
-  world.backend().set_partner(joints, HumanJoints::Zero());
+  HumanJoints velocities = HumanJoints::Zero();
+  velocities.row(0).setConstant(skin_speed);
+  world.backend().set_partner(joints, velocities);
   const JointCommand command = no_torque(world.robot());
   Bounce bounce;
   for (int i = 0; i < steps_in(0.2, dt); ++i) {
@@ -74,7 +78,7 @@ Bounce bounce_in(const Trial& trial, const ContactCompliance& skin, double dt) {
     if (f > 0.0) bounce.contact_time += dt;
     bounce.peak = std::max(bounce.peak, f);
   }
-  bounce.speed = world.state().v_WB.x();
+  bounce.speed = world.state().v_WB.x() - skin_speed;
   bounce.cost = world.cost();
   return bounce;
 }
@@ -102,6 +106,10 @@ void measure_skin_bounce(Trial& trial) {
                      "linearly implicit step of the same spring and damper");
       trial.relative(name("peak force against the implicit step"), "N", dt, found.peak, discrete.peak, 1e-3,
                      "the same");
+      const Bounce struck = bounce_in(trial, skin, dt, kImpactSpeed);
+      trial.relative(name("speed from a moving skin, less the skin's"), "m/s", dt, struck.speed, discrete.speed, 1e-3,
+                     "the same: a ball at rest, the skin comes");
+      trial.relative(name("peak force of a moving skin"), "N", dt, struck.peak, discrete.peak, 1e-3, "the same");
       trial.absolute(name("contact time against the implicit step"), "s", dt, found.contact_time, discrete.contact_time,
                      0.5 * dt, "the same number of steps");
       trial.relative(name("restitution"), "", dt, found.speed / kImpactSpeed, restitution(skin), 1.2 * implicit,

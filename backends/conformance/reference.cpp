@@ -159,6 +159,15 @@ RobotShape sphere(const Eigen::Vector3d& p_L, double radius) {
   return shape;
 }
 
+RobotShape rod_shape(int link, double radius, double half_length) {
+  RobotShape shape;
+  shape.kind = ShapeKind::kCapsule;
+  shape.link = link;
+  shape.radius = radius;
+  shape.half_length = half_length;
+  return shape;
+}
+
 RobotLink heavy_base() { return solid("base", kBaseMass, Eigen::Vector3d::Constant(kBaseMass)); }
 
 RobotJoint hinge(const std::string& name, double limit, double effort, double armature) {
@@ -192,7 +201,7 @@ std::shared_ptr<const RobotModel> sledge() {
   RobotModel robot;
   robot.links = {solid("sledge", 10.0, {0.4, 0.5, 0.6})};
   for (const double x : {-0.2, 0.2})
-    for (const double y : {-0.2, 0.2}) {
+    for (const double y : {-kSledgeHalfWidth, kSledgeHalfWidth}) {
       robot.feet.push_back(static_cast<int>(robot.shapes.size()));
       robot.shapes.push_back(sphere({x, y, 0.02 - kSledgeHeight}, 0.02));
     }
@@ -214,6 +223,38 @@ std::shared_ptr<const RobotModel> wheel() {
   robot.links = {heavy_base(), rim};
   robot.joints = {hinge("axle", 1.0, kWheelEffort, kWheelArmature)};
   return finished(robot, "wheel");
+}
+
+std::shared_ptr<const RobotModel> held_hand() {
+  RobotModel robot;
+  RobotLink arm = solid("arm", 2.0, {0.01, 0.02, 0.02});
+  arm.parent = 0;
+  arm.com = {kReach, 0.0, 0.0};
+  robot.links = {heavy_base(), arm};
+  robot.joints = {hinge("shoulder", 1.0, 100.0, 0.0)};
+  robot.shapes = {sphere({kReach, 0.0, 0.0}, kReachRadius)};
+  robot.shapes[0].link = 1;
+  robot.shapes[0].region = "hand";
+  return finished(robot, "hand");
+}
+
+std::shared_ptr<const RobotModel> forearm_on_thigh() {
+  RobotModel robot;
+  RobotLink thigh = solid("thigh", 5.0, {kThighInertia, kThighInertia, kThighInertia});
+  RobotLink forearm = solid("forearm", 1.0, {0.01, 0.002, 0.01});
+  thigh.parent = forearm.parent = 0;
+  forearm.X_PL.p = {kThighRadius + kForearmRadius, -kForearm, 0.0};
+  forearm.com = {0.0, kForearm, 0.0};
+  robot.links = {heavy_base(), thigh, forearm};
+  robot.joints = {hinge("hip", 3.0, 100.0, 0.0), hinge("elbow", 1.0, 100.0, 0.0)};
+  RobotShape on_thigh = rod_shape(1, kThighRadius, 0.2), on_forearm = rod_shape(2, kForearmRadius, 0.1);
+  on_forearm.X_LS = {Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY()),
+                     forearm.com};
+  on_thigh.region = "thigh";
+  on_forearm.region = "forearm";
+  robot.shapes = {on_thigh, on_forearm};
+  robot.self_collision = {{0, 1}};
+  return finished(robot, "limbs");
 }
 
 std::shared_ptr<const RobotModel> rods(int links) {

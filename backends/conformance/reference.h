@@ -42,7 +42,7 @@ double largest_joint_error(const RobotState& a, const RobotState& b);  // [rad]
 std::shared_ptr<const RobotModel> tumbling_box();
 
 // 10 kg on four spheres of 20 mm, 0.4 m apart, its origin 0.1 m over the ground.
-inline constexpr double kSledgeHeight = 0.1;
+inline constexpr double kSledgeHeight = 0.1, kSledgeHalfWidth = 0.2;
 std::shared_ptr<const RobotModel> sledge();
 
 // A solid ball with one sphere.
@@ -54,6 +54,16 @@ inline constexpr double kBaseMass = 1e6;
 // A wheel about z, limits +-1 rad, effort 10 N m.
 inline constexpr double kWheelInertia = 0.05, kWheelArmature = 0.03, kWheelEffort = 10.0;
 std::shared_ptr<const RobotModel> wheel();
+
+// An arm that turns about z, with a ball for a hand at its end.
+inline constexpr double kReach = 0.3, kReachRadius = 0.04;
+std::shared_ptr<const RobotModel> held_hand();
+
+// Two links that touch side by side at q = 0: a thigh along z, which turns about its own axis, and a forearm along y,
+// whose elbow turns about z and presses it onto the thigh. The pair is declared.
+inline constexpr double kThighInertia = 0.05, kThighRadius = 0.08;  // [kg m^2] about its axis, [m]
+inline constexpr double kForearm = 0.3, kForearmRadius = 0.04;      // from the elbow to the touch, [m]
+std::shared_ptr<const RobotModel> forearm_on_thigh();
 
 // `links` rods of 1 kg and 1 m in a row, hinged about y, hanging down at q = 0.
 inline constexpr double kRodMass = 1.0, kRodLength = 1.0, kRodInertia = 1.0 / 12.0;

@@ -212,7 +212,7 @@ void measure_held_push(Trial& trial) {
                    0.15, "the skin makes the peak a property of the bodies");
 }
 
-// Bitwise repetition while a person pushes the standing G1.
+// Bitwise repetition while a person pushes the standing G1; without the person where the engine has no solid partner.
 
 namespace {
 
@@ -220,8 +220,9 @@ constexpr double kBefore = 0.3, kAfter = 0.3;  // of the snapshot [s]
 
 Scene pushed_scene(const Trial& trial) {
   Scene scene = trial.scene(trial.robot(), trial.dt());
-  scene.partner = PartnerMode::kSolid;
   scene.self_collision = true;
+  if (!trial.no_partner().empty()) return scene;
+  scene.partner = PartnerMode::kSolid;
   HumanCapsule capsule;
   capsule.name = "chest";
   capsule.region = "chest";
@@ -283,6 +284,17 @@ Trace fresh_run(const std::string& engine, const Scene& scene) {
   return run(*backend, kBefore + kAfter);
 }
 
+// Whether the continuation is one in contact with the person.
+void note_touch(Trial& trial, const Backend& backend) {
+  constexpr const char* kQuantity = "person touches at the snapshot";
+  if (!trial.no_partner().empty()) return trial.unsupported(kQuantity, trial.no_partner());
+  const bool touched = std::ranges::any_of(backend.contacts(), [](const Contact& contact) {
+    return contact.side == ContactSide::kHuman && contact.f_W.norm() > 0.0;
+  });
+  trial.absolute(kQuantity, "", trial.dt(), touched ? 1.0 : 0.0, 1.0, 0.0,
+                 "so that the continuation is one in contact");
+}
+
 Trace joined(Trace first, const Trace& second) {
   first.insert(first.end(), second.begin(), second.end());
   return first;
@@ -298,11 +310,7 @@ void measure_repeat(Trial& trial) {
   const auto backend = make_backend(trial.engine(), scene);
   start(*backend);
   const Trace before = run(*backend, kBefore);
-  bool touched = false;
-  for (const Contact& contact : backend->contacts())
-    touched = touched || (contact.side == ContactSide::kHuman && contact.f_W.norm() > 0.0);
-  trial.absolute("person touches at the snapshot", "", trial.dt(), touched ? 1.0 : 0.0, 1.0, 0.0,
-                 "so that the continuation is one in contact");
+  note_touch(trial, *backend);
   const Snapshot snapshot = backend->snapshot();
   const Trace after = run(*backend, kAfter), whole = joined(before, after);
 

@@ -41,15 +41,21 @@ constexpr std::array kScenes = {
     ConformanceScene{"joint-stop", "a driven joint stops at its limit", measure_joint_stop},
     ConformanceScene{"incline", "slip angle and sliding on an incline along x, y and the diagonal", measure_incline},
     ConformanceScene{"rolling-ball", "a sliding ball comes to roll", measure_rolling_ball},
-    ConformanceScene{"skin-bounce", "a ball on the skin of a held human capsule is a mass on a spring",
-                     measure_skin_bounce},
+    ConformanceScene{"skin-bounce", "a ball on the skin of a human capsule, held or in motion, is a mass on a spring",
+                     measure_skin_bounce, "", nullptr, true},
+    ConformanceScene{"skin-rub", "a partner's limb that slides past a hand drags it by the pair's friction",
+                     measure_skin_rub, "", nullptr, true},
+    ConformanceScene{"skin-carry", "a partner that moves on carries a sledge along, by mu g until both move alike",
+                     measure_skin_carry, "", nullptr, true},
+    ConformanceScene{"self-rub", "a forearm pressed on a turning thigh brakes it by the pair's friction",
+                     measure_self_rub},
     ConformanceScene{"ground-bounce", "the ground does not give energy back", measure_ground_bounce},
     ConformanceScene{"stand", "the robot stands under ankle feedback and its weight is carried", measure_stand,
                      kLawGroup, lacks_ankles},
     ConformanceScene{"fall", "the robot without feedback falls at the same time everywhere", measure_fall, kLawGroup,
                      lacks_soles},
     ConformanceScene{"held-push", "a person pushes the torso and holds: momentum, peak and held force",
-                     measure_held_push, kLawGroup, lacks_trunk_or_ankles},
+                     measure_held_push, kLawGroup, lacks_trunk_or_ankles, true},
     ConformanceScene{"self-collision", "a hand sent into the trunk is stopped, momentum stays", measure_self_collision,
                      kLawGroup, lacks_hand_poses},
     ConformanceScene{"repeat", "snapshot in contact, rerun, second thread and reset continue bitwise", measure_repeat},
@@ -58,6 +64,10 @@ constexpr std::array kScenes = {
 void run_measurements(const ConformanceScene& scene, const std::string& engine, const Settings& settings,
                       SceneRun& run) {
   Trial trial(engine, settings, std::string(scene.name), run);
+  if (scene.with_partner && !trial.no_partner().empty()) {
+    trial.unsupported("solid partner", trial.no_partner());
+    return;
+  }
   try {
     scene.measure(trial);
   } catch (const std::exception& error) {
@@ -118,6 +128,8 @@ std::string_view to_string(CheckStatus verdict) {
       return "pass";
     case CheckStatus::kDeviation:
       return "deviation";
+    case CheckStatus::kUnsupported:
+      return "unsupported";
     case CheckStatus::kFail:
       break;
   }
@@ -125,6 +137,7 @@ std::string_view to_string(CheckStatus verdict) {
 }
 
 CheckStatus status_of(const std::string& engine, const Measurement& measurement) {
+  if (measurement.unsupported) return CheckStatus::kUnsupported;
   const double error = error_of(measurement);
   if (error <= measurement.tolerance) return CheckStatus::kPass;  // false for NaN
   const EngineDeviation* known = find_deviation(engine, measurement.scene, measurement.quantity);
@@ -162,12 +175,27 @@ void agree(std::span<EngineReport> reports) {
     });
 }
 
+void Tally::count(CheckStatus verdict) {
+  switch (verdict) {
+    case CheckStatus::kPass:
+      ++passed;
+      break;
+    case CheckStatus::kFail:
+      ++failed;
+      break;
+    case CheckStatus::kDeviation:
+      ++deviations;
+      break;
+    case CheckStatus::kUnsupported:
+      ++unsupported;
+      break;
+  }
+}
+
 Tally tally(const EngineReport& report) {
   Tally tally;
-  for_each_measurement(report, [&](const Measurement& measurement) {
-    const CheckStatus verdict = status_of(report.engine, measurement);
-    ++(verdict == CheckStatus::kPass ? tally.passed : verdict == CheckStatus::kFail ? tally.failed : tally.deviations);
-  });
+  for_each_measurement(report,
+                       [&](const Measurement& measurement) { tally.count(status_of(report.engine, measurement)); });
   return tally;
 }
 

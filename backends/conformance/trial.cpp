@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "duet/backends/actuation.h"
 #include "duet/backends/engine_module.h"
@@ -13,6 +14,7 @@ namespace duet::conformance {
 
 Trial::Trial(std::string engine, const Settings& settings, std::string scene, SceneRun& run)
     : engine_(std::move(engine)),
+      no_partner_(engine_module(engine_).no_solid_partner),
       settings_(settings),
       scene_(std::move(scene)),
       run_(run),
@@ -73,6 +75,11 @@ Measurement& Trial::at_most_found(std::string quantity, std::string unit, double
       relative(std::move(quantity), std::move(unit), dt, value, value, 0.15, "no bound is known of this robot");
   measurement.across_engines = true;
   return measurement;
+}
+
+void Trial::unsupported(std::string quantity, std::string reason) {
+  constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+  absolute(std::move(quantity), "", settings_.dt, kNothing, kNothing, 0.0, std::move(reason)).unsupported = true;
 }
 
 void Trial::dot(std::string error, std::string unit, double dt, double value, double cost) {

@@ -19,6 +19,8 @@ class Trial {
 
   [[nodiscard]] const std::string& engine() const { return engine_; }
   [[nodiscard]] double dt() const { return settings_.dt; }
+  // Why the engine has no solid partner; "" where it has one.
+  [[nodiscard]] std::string no_partner() const { return no_partner_; }
   [[nodiscard]] bool full() const { return settings_.effort == Effort::kFull; }
   // Step sizes for what depends on them, each half of the one before; quick: dt and dt / 2.
   [[nodiscard]] std::vector<double> step_sizes() const;
@@ -42,6 +44,8 @@ class Trial {
   // median of the engines.
   Measurement& at_most_found(std::string quantity, std::string unit, double dt, double value, double bound,
                              std::string note);
+  // Notes that the engine lacks what `quantity` asks for, and why.
+  void unsupported(std::string quantity, std::string reason);
   // Notes a dot of error against cost, where error > 0.
   void dot(std::string error, std::string unit, double dt, double value, double cost);
   // Notes the observed order of convergence between consecutive step sizes, log2 of the ratio of errors, as between 0.8
@@ -52,7 +56,7 @@ class Trial {
  private:
   Measurement& note(Measurement measurement);
 
-  std::string engine_;
+  std::string engine_, no_partner_;
   const Settings& settings_;
   std::string scene_;
   SceneRun& run_;
@@ -125,6 +129,10 @@ std::string lacks_trunk_or_ankles(const RobotModel& robot);  // a shape of the r
 // contact_scenes.cpp
 void measure_self_collision(Trial& trial);
 std::string lacks_hand_poses(const RobotModel& robot);  // the poses hand_before_trunk and hand_in_trunk
+// two_body_scenes.cpp
+void measure_skin_rub(Trial& trial);
+void measure_skin_carry(Trial& trial);
+void measure_self_rub(Trial& trial);
 // standing_scenes.cpp
 void measure_repeat(Trial& trial);
 

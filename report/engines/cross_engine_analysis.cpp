@@ -381,6 +381,10 @@ TitledTable certificate_table(const nlohmann::json& certificate, const std::vect
   titled.notes = {certified.empty() ? "It names no engine."
                                     : "An asserted deviation is a known difference that the suite of scenes expects, "
                                       "with its reason."};
+  for (const nlohmann::json& engine : certified)
+    if (engine.contains("unsupported"))
+      titled.notes.push_back(fmt::format("{} lacks what {} checks need: they are unsupported, and not in the counts.",
+                                         text_of(engine, "name"), count_of(engine, "unsupported")));
   if (const std::string schema = text_of(certificate, "schema"); schema != kSchema) {
     titled.notes.push_back(
         fmt::format("Its schema is {}, expected {}: it may say more than is shown.", schema, kSchema));

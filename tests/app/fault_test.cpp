@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 
+#include "duet/app/certificate.h"
 #include "duet/core/file.h"
 #include "duet/rows/folder/run_directory.h"
 #include "tests/app/program.h"
@@ -32,6 +33,8 @@ class Faults : public testing::Test {
     for (const auto& entry : fs::directory_iterator(test::built_engines()))
       fs::create_symlink(entry.path(), fs::path(engines()) / entry.path().filename());
     fs::create_symlink(DUET_FAULTY_ENGINE, fs::path(engines()) / "duet_faulty.so");
+    fs::create_symlink(DUET_ALTERED_ENGINE, fs::path(engines()) / "duet_altered.so");
+    fs::create_symlink(DUET_PARTNERLESS_ENGINE, fs::path(engines()) / "duet_partnerless.so");
   }
   [[nodiscard]] std::string engines() const { return folder_ / "engines"; }
 
@@ -77,6 +80,59 @@ TEST_F(Faults, AnEngineThatStandsStillFailsItsScenesAndAllAreReported) {
   const Ended ended = run("validate --engine faulty --effort quick -q");
   EXPECT_EQ(ended.code, 5) << ended.text;
   EXPECT_THAT(ended.text, AllOf(HasSubstr("pendulum"), HasSubstr("chain"), HasSubstr("stand")));
+}
+
+// What `validate --json` printed.
+nlohmann::json certificate_of(const Ended& ended) {
+  const std::size_t begin = ended.text.find('{');
+  return begin == std::string::npos ? nlohmann::json() : nlohmann::json::parse(ended.text.substr(begin));
+}
+
+// The scenes of two bodies: each of these faults of a contact code passed all checks once.
+TEST_F(Faults, AContactCodeThatForgetsThePartnersMotionOrAFrictionFailsTwoChecksOrMore) {
+  int tried = 0;
+  for (const char* engine : {"mujoco", "bullet", "dart", "ode", "simbody"}) {
+    if (!fs::exists(fs::path(engines()) / (std::string("duet_") + engine + ".so"))) continue;
+    const auto failed = [&](const std::string& fault) {
+      const std::string profile = folder_ / "altered.yaml";
+      write_file(profile, std::string("schema: duet.profile/1\nname: altered\nabout: a fault\nengines:\n") +
+                              "  altered: {engine: " + engine + ", fault: " + fault + "}\n");
+      const Ended ended = run("validate -q --json --engine altered --profile " + profile +
+                              " --scene skin-bounce,skin-rub,skin-carry,self-rub");
+      return certificate_of(ended).at("engines").at(0).at("failed").get<int>();
+    };
+    const int sound = failed("none");
+    for (const char* fault : {"deaf", "slick", "slick_self"})
+      EXPECT_GE(failed(fault), sound + 2) << engine << ", " << fault;
+    ++tried;
+  }
+  if (tried == 0) GTEST_SKIP() << "not run: no physics engine is there";
+}
+
+TEST_F(Faults, AnEngineWithoutASolidPartnerIsCertifiedWithoutOne) {
+  if (!fs::exists(fs::path(engines()) / "duet_mujoco.so")) GTEST_SKIP() << "not run: engine mujoco absent";
+  const Ended ended =
+      run("validate --engine partnerless --scene skin-bounce,held-push,repeat -o " + (folder_ / "parity"));
+  EXPECT_EQ(ended.code, 0) << ended.text;
+  EXPECT_THAT(ended.text, AllOf(HasSubstr("6 passed, 0 asserted deviations, 0 failed, 3 unsupported"),
+                                HasSubstr("3 checks are unsupported: it has no solid partner (its people are air)")));
+  const Certificate read = load_certificate(folder_ / "parity/certificate.json");
+  EXPECT_EQ(read.engines[0].tally.unsupported, 3);
+  EXPECT_EQ(read.engines[0].measurements[0].verdict, conformance::CheckStatus::kUnsupported);
+}
+
+TEST_F(Faults, AnEngineWithoutASolidPartnerHasRowsThatSaySoWhereTheSuiteHasOne) {
+  if (!fs::exists(fs::path(engines()) / "duet_mujoco.so")) GTEST_SKIP() << "not run: engine mujoco absent";
+  const Ended ended = run("run " + suite("playback, partnerless") + " -s partner=solid -q -o " + (folder_ / "run"));
+  EXPECT_EQ(ended.code, 3) << ended.text;
+  EXPECT_EQ(rows().at("partnerless").outcome, Outcome::kUnsupported);
+  EXPECT_THAT(
+      rows().at("partnerless").message,
+      HasSubstr("engine 'partnerless' has no solid partner (its people are air): expected the partner ghost or"));
+  const Ended alone = run("run " + suite("partnerless") + " -s partner=solid -q -o " + (folder_ / "alone"));
+  EXPECT_EQ(alone.code, 4) << alone.text;
+  EXPECT_FALSE(fs::exists(folder_ / "alone"));
+  EXPECT_EQ(run("run " + suite("partnerless") + " -q -o " + (folder_ / "ghost")).code, 0);
 }
 
 TEST_F(Faults, WhatIsNotInTheFoldersThatWereGivenIsSaidToBeThere) {

@@ -94,7 +94,8 @@ TEST_F(CertificateFile, EditedByHandIsRefused) {
   edited = json;
   edited["engines"][1]["failed"] = 0;
   EXPECT_THAT(refusal(edited),
-              HasSubstr("engines[1]: says 0 passed, 0 failed, 0 deviations; its measurements are 0, 2, 0"));
+              HasSubstr("engines[1]: says 0 passed, 0 failed, 0 deviations, 0 unsupported; its measurements are "
+                        "0, 2, 0, 0"));
 }
 
 TEST_F(CertificateFile, FaultsAreOneSentenceWithTheirPlace) {
@@ -111,7 +112,7 @@ TEST_F(CertificateFile, FaultsAreOneSentenceWithTheirPlace) {
   EXPECT_THAT(refusal(broken), HasSubstr("key 'engines' expects a list"));
   broken = json;
   broken["engines"][0]["measurements"][0]["verdict"] = "fine";
-  EXPECT_THAT(refusal(broken), HasSubstr("verdict is 'fine', expected pass, FAIL or deviation"));
+  EXPECT_THAT(refusal(broken), HasSubstr("verdict is 'fine', expected pass, FAIL, deviation or unsupported"));
   broken = json;
   broken["engines"][0]["options"] = nlohmann::json::array();
   EXPECT_THAT(refusal(broken), HasSubstr("key 'options' expects an object"));

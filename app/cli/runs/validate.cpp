@@ -72,7 +72,12 @@ std::vector<conformance::EngineReport> run_scenes(const ValidateArguments& argum
   return reports;
 }
 
+std::string number_text(const conformance::Measurement& found, double number) {
+  return found.unsupported ? "-" : fmt::format("{:.4g}", number);
+}
+
 std::string tolerance_text(const conformance::Measurement& found) {
+  if (found.unsupported) return "-";
   return found.relative ? fmt::format("{:.2g} %", 100.0 * found.tolerance) : fmt::format("{:.2g}", found.tolerance);
 }
 
@@ -85,8 +90,8 @@ std::string engine_table(const CertifiedEngine& engine, bool all) {
     if (!all && entry.verdict == conformance::CheckStatus::kPass) continue;
     const conformance::Measurement& found = entry.found;
     table.rows.push_back({found.scene, found.quantity, std::string(conformance::to_string(entry.verdict)),
-                          fmt::format("{:g}", 1e3 * found.dt), fmt::format("{:.4g}", found.value),
-                          fmt::format("{:.4g}", found.expected), tolerance_text(found), found.unit});
+                          fmt::format("{:g}", 1e3 * found.dt), number_text(found, found.value),
+                          number_text(found, found.expected), tolerance_text(found), found.unit});
   }
   return table.rows.empty() ? "" : fmt::format("\n{}\n", markdown_table(table));
 }
@@ -101,9 +106,19 @@ std::string failed_by_law(const CertifiedEngine& engine) {
 }
 
 std::string summary(const CertifiedEngine& engine) {
-  return fmt::format("{} {} ({}, {:g} ms): {} passed, {} asserted deviation{}, {} failed{}\n", engine.name,
+  const std::string unsupported =
+      engine.tally.unsupported > 0 ? fmt::format(", {} unsupported", engine.tally.unsupported) : "";
+  return fmt::format("{} {} ({}, {:g} ms): {} passed, {} asserted deviation{}, {} failed{}{}\n", engine.name,
                      engine.version, engine.profile, 1e3 * engine.dt, engine.tally.passed, engine.tally.deviations,
-                     engine.tally.deviations == 1 ? "" : "s", engine.tally.failed, failed_by_law(engine));
+                     engine.tally.deviations == 1 ? "" : "s", engine.tally.failed, failed_by_law(engine), unsupported);
+}
+
+// Why checks of an engine are unsupported.
+void note_unsupported(Session& session, const std::vector<conformance::EngineReport>& reports) {
+  for (const conformance::EngineReport& report : reports)
+    if (const int checks = conformance::tally(report).unsupported; checks > 0)
+      note(session, fmt::format("{}: {} check{} unsupported: it has no solid partner ({})", report.engine, checks,
+                                checks == 1 ? " is" : "s are", engine_module(report.engine).no_solid_partner));
 }
 
 // Scenes that the robot lacks something for, each once.
@@ -128,6 +143,7 @@ void run_validate(Session& session, const ValidateArguments& arguments) {
     if (engine.tally.failed > 0) session.exit_code = kExitDeterminism;
   }
   note_skipped(session, reports);
+  note_unsupported(session, reports);
   for (const conformance::EngineReport& report : reports)
     for (const std::string& stale :
          arguments.card.empty() ? conformance::stale_deviations(report) : std::vector<std::string>{})

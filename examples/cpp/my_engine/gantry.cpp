@@ -145,8 +145,12 @@ double bare_step_seconds(const duet::Scene& scene, const duet::RobotState& state
   return duet::thread_cpu_seconds() - begin;
 }
 
-const duet::EngineModule kModule = {
-    .name = "gantry", .version = version, .make = make, .options = kOptions, .bare_step_seconds = bare_step_seconds};
+const duet::EngineModule kModule = {.name = "gantry",
+                                    .version = version,
+                                    .make = make,
+                                    .options = kOptions,
+                                    .bare_step_seconds = bare_step_seconds,
+                                    .no_solid_partner = "nothing touches its robot"};
 
 }  // namespace
 
