@@ -1,4 +1,4 @@
-# The installed package, used as a stranger uses it: what is there, the five examples of examples/cpp, an engine of one's
+# The installed package, used as a stranger uses it: what is there, the six examples of examples/cpp, an engine of one's
 # own, pkg-config, and a project that takes the tree in by add_subdirectory. Any failure ends the script with its output.
 cmake_minimum_required(VERSION 3.25)
 if(SANITIZE)
@@ -138,6 +138,17 @@ if("duet_mujoco.so" IN_LIST modules)  # found without being told where, by the p
   expect("${text}" "pd in mujoco: [0-9.]+ s.*ankles in mujoco: [0-9.]+ s")
 endif()
 
+# So are engines in worlds of their own, those whose development files are here; each stands and swings as it should.
+build(native_engines ${SOURCE}/examples/cpp/native_engines)
+set(ENV{DUET_ENGINES} ${SCRATCH}/native_engines:${prefix}/${ENGINES})
+file(GLOB own_worlds RELATIVE ${SCRATCH}/native_engines ${SCRATCH}/native_engines/duet_*.so)
+foreach(module IN LISTS own_worlds)
+  string(REGEX REPLACE "^duet_(.*)\\.so$" "\\1" engine ${module})
+  run(text ${duet} validate --engine ${engine} --scene state,pendulum,momentum,fall)
+  expect("${text}" "${engine} [^\n]* 0 failed")
+endforeach()
+set(ENV{DUET_ENGINES} "")
+
 # A module that lays out types otherwise than duet is refused by one sentence. This one aligns as code for AVX does.
 build(other_layout ${SOURCE}/examples/cpp/my_engine "-DCMAKE_CXX_FLAGS=-UEIGEN_MAX_ALIGN_BYTES -DEIGEN_MAX_STATIC_ALIGN_BYTES=32")
 set(ENV{DUET_ENGINES} ${SCRATCH}/other_layout)
@@ -182,4 +193,4 @@ target_link_libraries(user INTERFACE duet::metrics)
 ")
 run(ignored ${CMAKE_COMMAND} -G Ninja -S embedding -B embedded -D CMAKE_CXX_COMPILER=${COMPILER}
     -D CMAKE_C_COMPILER=${C_COMPILER})
-message("install: the package, four examples, an engine, pkg-config and add_subdirectory work")
+message("install: the package, four examples, engines, pkg-config and add_subdirectory work")
