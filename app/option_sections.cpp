@@ -55,9 +55,9 @@ std::vector<OptionSection> policy_option_sections() {
 std::vector<OptionSection> engine_option_sections() {
   std::vector<OptionSection> sections;
   for (const EngineInfo& engine : engines()) {
-    if (!engine.available) continue;
+    if (engine.module == nullptr) continue;
     std::vector<FieldRow> rows;
-    for (const EngineOption& option : engine_module(engine.name).options) {
+    for (const EngineOption& option : engine.module->options) {
       const FieldRange range = {option.low, option.high};
       const std::string values = !option.choices.empty() ? fmt::format("{}", fmt::join(option.choices, ", "))
                                  : option.whole          ? values_of_whole(range, option.low, option.high)

@@ -50,7 +50,7 @@ std::vector<fs::path> module_folders() {
 
 struct Loaded {
   const EngineModule* module = nullptr;
-  std::string reason;  // where null
+  std::string reason;  // why it cannot be used; "" where it can
 };
 
 std::string last_error() {
@@ -70,7 +70,7 @@ Loaded load_file(const std::string& name, const fs::path& file) {
                         "it again with the headers and the compiler flags of this duet",
                         file.string(), module->interface, duet_version(), engine_interface())};
   if (name != module->name) return {nullptr, fmt::format("its module names itself '{}'", module->name)};
-  return {module, ""};
+  return {module, module->absence == nullptr ? "" : module->absence()};
 }
 
 Loaded load(const std::string& name) {
@@ -124,11 +124,12 @@ std::vector<EngineInfo> engines() {
   std::vector<EngineInfo> infos;
   for (const std::string& name : engine_names()) {
     const Loaded& engine = loaded(name);
-    const bool available = engine.module != nullptr;
+    const bool available = engine.reason.empty();
     infos.push_back({.name = name,
                      .available = available,
                      .version = available ? engine.module->version() : "",
-                     .reason = engine.reason});
+                     .reason = engine.reason,
+                     .module = engine.module});
   }
   return infos;
 }
@@ -136,13 +137,15 @@ std::vector<EngineInfo> engines() {
 const EngineModule& engine_module(const std::string& engine) {
   check_name(engine);
   const Loaded& entry = loaded(engine);
-  if (entry.module == nullptr) throw MissingError(fmt::format("engine '{}' is absent: {}", engine, entry.reason));
+  if (!entry.reason.empty()) throw MissingError(fmt::format("engine '{}' is absent: {}", engine, entry.reason));
   return *entry.module;
 }
 
 const EngineModule* find_engine_module(const std::string& engine) {
   const std::vector<std::string> names = engine_names();
-  return std::ranges::find(names, engine) == names.end() ? nullptr : loaded(engine).module;
+  if (std::ranges::find(names, engine) == names.end()) return nullptr;
+  const Loaded& entry = loaded(engine);
+  return entry.reason.empty() ? entry.module : nullptr;
 }
 
 std::string refusal_of(const std::string& engine, PartnerMode partner) {

@@ -125,6 +125,9 @@ struct EngineModule {
   // Why the engine takes no PartnerMode::kSolid, part of a sentence ("nothing touches its robot"); "" where it does.
   // make_backend refuses such a scene, and the conformance suite lists what needs it as unsupported.
   const char* no_solid_partner = "";
+  // Why this machine cannot run the engine though its module loads (packages that are missing), as a sentence without
+  // a point; "" where it can. Null: it always can. Asked once.
+  std::string (*absence)() = nullptr;
 };
 
 inline std::uint64_t engine_interface() {
@@ -159,9 +162,10 @@ inline std::uint64_t engine_interface() {
                   &EngineOption::high, &EngineOption::whole, &EngineOption::meaning);
   digest.add_type(&EngineDeviation::scene, &EngineDeviation::quantity, &EngineDeviation::reason,
                   &EngineDeviation::bound, &EngineDeviation::only_at_full_effort);
-  digest.add_type(&EngineModule::name, &EngineModule::version, &EngineModule::make, &EngineModule::options,
-                  &EngineModule::bare_step_seconds, &EngineModule::step_target_us, &EngineModule::deviations,
-                  &EngineModule::no_solid_partner);
+  digest.add_type(&EngineModule::interface, &EngineModule::built_with, &EngineModule::name, &EngineModule::version,
+                  &EngineModule::make, &EngineModule::options, &EngineModule::bare_step_seconds,
+                  &EngineModule::step_target_us, &EngineModule::deviations, &EngineModule::no_solid_partner,
+                  &EngineModule::absence);
   digest.add_type<Backend>();
   digest.add(engine_layout::Digest::first_word(&engine_layout::AfterBackend::after));
   return digest.value();
@@ -187,6 +191,8 @@ struct EngineInfo {
   bool available = false;
   std::string version;  // where available
   std::string reason;   // why not, where not ("libode.so.8: cannot open shared object file")
+  const EngineModule* module =
+      nullptr;  // null where none could be loaded; its tables hold where `absence` says why not
 };
 
 // The five engines of the benchmark whether present or not, then other modules by name.

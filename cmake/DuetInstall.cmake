@@ -55,6 +55,8 @@ foreach(folder robots controllers policies metrics profiles suites)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_DATADIR}/duet COMPONENT share
           FILES_MATCHING PATTERN "*.yaml" PATTERN "*.urdf" PATTERN "*.safetensors" PATTERN "test_split.txt")
 endforeach()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/backends/node DESTINATION ${CMAKE_INSTALL_DATADIR}/duet/backends COMPONENT share
+        FILES_MATCHING PATTERN "*.mjs" PATTERN "*.json")
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT share)
 
 get_property(engines GLOBAL PROPERTY DUET_ENGINE_TARGETS)

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "duet/core/child_process.h"
 #include "duet/core/field.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"

@@ -35,6 +35,7 @@ class Faults : public testing::Test {
     fs::create_symlink(DUET_FAULTY_ENGINE, fs::path(engines()) / "duet_faulty.so");
     fs::create_symlink(DUET_ALTERED_ENGINE, fs::path(engines()) / "duet_altered.so");
     fs::create_symlink(DUET_PARTNERLESS_ENGINE, fs::path(engines()) / "duet_partnerless.so");
+    fs::create_symlink(DUET_HOSTED_ENGINE, fs::path(engines()) / "duet_hosted.so");
   }
   [[nodiscard]] std::string engines() const { return folder_ / "engines"; }
 
@@ -48,15 +49,15 @@ class Faults : public testing::Test {
     return ended;
   }
 
-  // A suite of one clip in these engines, `fault` in the faulty one.
+  // A suite of one clip in these engines, `fault` in the failing one.
   [[nodiscard]] std::string suite(const std::string& engine_names, const std::string& fault = "throw",
-                                  const std::string& controllers = "pd") const {
+                                  const std::string& controllers = "pd", const std::string& failing = "faulty") const {
     std::string path = folder_ / "suite.yaml";
     write_file(path,
                "schema: duet.suite/1\nname: faults\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
                "engines: [" +
                    engine_names + "]\ncontrollers: [" + controllers + "]\npolicies: [replay]\nnull_arm: false\n" +
-                   "profile: {name: mine, engines: {faulty: {fault: " + fault + "}}}\n");
+                   "profile: {name: mine, engines: {" + failing + ": {fault: " + fault + "}}}\n");
     return path;
   }
 
@@ -150,6 +151,27 @@ TEST_F(Faults, AnEngineThatThrowsEndsItsEpisodeByNameAndTheOthersGoOn) {
   EXPECT_THAT(row.at("faulty").message, HasSubstr("faulty: an error of the engine itself"));
   EXPECT_EQ(row.at("faulty").success, false);
   EXPECT_EQ(row.at("playback").outcome, Outcome::kOk);
+}
+
+TEST_F(Faults, AHostThatDiesOrLiesIsARowWithItsMessageAndTheOthersGoOn) {
+  if (system("python3 -c ''") != 0) GTEST_SKIP() << "not run: python3 absent";
+  const std::map<std::string, std::string> faults = {
+      {"exit", "hosted: its host ended with exit status 7 before it answered message 201"},
+      {"nan", "hosted: number 5 of its host's answer at 0.3980 s is not finite"},
+      {"short", "hosted: its host answers message 201 with"},
+      {"echo", "hosted: its host answers message 202, expected 201"},
+      {"say", "hosted: its solver met a wall"}};
+  for (const auto& [fault, message] : faults) {
+    const std::string run_it =
+        "run " + suite("playback, hosted", fault, "pd", "hosted") + " -q -o " + (folder_ / "run");
+    const Ended ended = run(run_it);
+    EXPECT_EQ(ended.code, 3) << ended.text;
+    const auto row = rows();
+    EXPECT_EQ(row.at("hosted").outcome, Outcome::kError) << fault;
+    EXPECT_THAT(row.at("hosted").message, HasSubstr(message));
+    EXPECT_EQ(row.at("playback").outcome, Outcome::kOk);
+    fs::remove_all(folder_ / "run");
+  }
 }
 
 TEST_F(Faults, AnEngineThatDivergesSaysSoByName) {

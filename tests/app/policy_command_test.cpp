@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "duet/core/child_process.h"
 #include "duet/core/require.h"
-#include "duet/policies/external/process_policy.h"
 #include "duet/rows/folder/run_directory.h"
 #include "tests/app/program.h"
 

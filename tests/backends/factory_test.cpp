@@ -1,5 +1,9 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <set>
+#include <span>
+
 #include "duet/backends/engine_module.h"
 #include "duet/core/require.h"
 #include "tests/backends/small_robots.h"
@@ -24,7 +28,11 @@ TEST(Factory, ListsEachEngineOnceWithVersionOrReason) {
     EXPECT_EQ(info.available, !info.version.empty()) << info.name;
     EXPECT_EQ(info.available, info.reason.empty()) << info.name;
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"mujoco", "bullet", "ode", "simbody", "dart"}));
+  const std::vector<std::string> benchmark = {"mujoco", "bullet", "ode", "simbody", "dart"};
+  ASSERT_GE(names.size(), benchmark.size());
+  EXPECT_TRUE(std::ranges::equal(benchmark, std::span(names).first(benchmark.size())));  // then other modules by name
+  EXPECT_TRUE(std::ranges::is_sorted(std::span(names).subspan(benchmark.size())));
+  EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
 }
 
 TEST(Factory, MakesWhatItListsAsAvailableAndRefusesTheRestByName) {
@@ -46,6 +54,7 @@ TEST(Factory, RefusesAnUnknownEngineWithTheNearestName) {
   EXPECT_THAT(message, HasSubstr("simbody"));
 }
 
+// But one in a host, whose cost is not this thread's.
 TEST(Factory, EveryEngineThatIsThereHasABareLoop) {
   const Scene scene = sledge_scene();
   const RobotState state = test::state_of(*scene.robot, {0.0, 0.0, 0.1});
@@ -53,6 +62,7 @@ TEST(Factory, EveryEngineThatIsThereHasABareLoop) {
   for (const EngineInfo& info : engines()) {
     if (!info.available) continue;
     const EngineModule& module = engine_module(info.name);
+    if (module.absence != nullptr) continue;
     EXPECT_GT(module.bare_step_seconds(scene, state, command, 100), 0.0) << info.name;
     EXPECT_THAT(thrown_message<std::invalid_argument>([&] { module.bare_step_seconds(scene, state, command, 0); }),
                 HasSubstr("steps is 0"))

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "duet/core/child_process.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/policies/catalogue/registry.h"

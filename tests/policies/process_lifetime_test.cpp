@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "duet/core/child_process.h"
 #include "duet/core/require.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/external/external_policy.h"
@@ -122,7 +123,7 @@ serve(Still, 'here.sock')
   EXPECT_TRUE(refused->faults().dead);
   EXPECT_SENTENCE(refused->faults().message);
   const ChildProcess server({"env", "-u", "DUET_POLICY_FD", "python3", "server.py"},
-                            std::filesystem::path(folder_ / "x").parent_path().string(), 0);
+                            std::filesystem::path(folder_ / "x").parent_path().string(), "DUET_POLICY_FD", 0);
   std::unique_ptr<Policy> first;
   for (int i = 0; i < 2000 && (first == nullptr || first->faults().dead); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
