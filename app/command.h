@@ -77,6 +77,8 @@ void add_replay(CLI::App& app, Session& session);
 void add_rate(CLI::App& app, Session& session);
 void add_agree(CLI::App& app, Session& session);
 void add_compare(CLI::App& app, Session& session);
+void add_attribute(CLI::App& app, Session& session);
+void add_blame(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
 void add_bless(CLI::App& app, Session& session);
 void add_policy_check(CLI::App& app, Session& session);  // `policy check`

@@ -27,14 +27,6 @@ std::string trajectory_path(const std::string& folder, const EpisodeRow& row) {
   return (std::filesystem::path(folder) / (row.key.substr(0, 16) + ".npz")).string();
 }
 
-std::unique_ptr<Controller> controller_of(const EpisodeSpec& spec) {
-  const SuiteController& controller = *spec.controller;
-  ControllerOptions options = controller.options;
-  if (spec.reference != nullptr) options = with_command(about(controller), options, *spec.reference);
-  require(spec.body->loaded.make != nullptr, "controller '{}' was left out", controller.name);
-  return spec.body->loaded.make(options);
-}
-
 std::unique_ptr<Policy> policy_of(const EpisodeSpec& spec, const EpisodeOverrides& overrides) {
   if (overrides.policy) return overrides.policy();
   require(spec.leader != nullptr, "policy '{}' was left out", spec.policy->name);
@@ -122,6 +114,14 @@ std::string Experiment::lack_of(const EpisodeSpec& spec) {
   return spec.leader == nullptr ? "" : spec.leader->refusal;
 }
 
+std::unique_ptr<Controller> Experiment::controller(const EpisodeSpec& spec) {
+  const SuiteController& named = *spec.controller;
+  ControllerOptions options = named.options;
+  if (spec.reference != nullptr) options = with_command(about(named), options, *spec.reference);
+  require(spec.body->loaded.make != nullptr, "controller '{}' was left out", named.name);
+  return spec.body->loaded.make(options);
+}
+
 Scene Experiment::scene(const EpisodeSpec& spec) const {
   const EngineSettings settings = settings_under(*spec.perturbation, *spec.settings);
   Scene scene;
@@ -186,7 +186,7 @@ Rollout Experiment::executed(const EpisodeSpec& spec, const Setup& setup, Leader
   if (spec.engine == kPlaybackEngine) return play_back(setup, leader);
   const std::unique_ptr<Backend> backend = make_backend(spec.engine, scene(spec));
   row.engine_version = backend->version();
-  return roll_out(setup, *backend, *controller_of(spec), leader);
+  return roll_out(setup, *backend, *controller(spec), leader);
 }
 
 // The neutral pose, with the joints that a controller leaves to the reference where it was made to have them.

@@ -78,6 +78,8 @@ class Experiment {
   [[nodiscard]] EpisodeRow row(const EpisodeSpec& spec) const;
   // Why this machine lacks the episode's controller or policy; empty where it has both.
   [[nodiscard]] static std::string lack_of(const EpisodeSpec& spec);
+  // A new controller of the episode. Throws std::invalid_argument for one that was left out.
+  [[nodiscard]] static std::unique_ptr<Controller> controller(const EpisodeSpec& spec);
   // The scene with the perturbation's ground and robot, and the setup of an episode that a clip leads.
   [[nodiscard]] Scene scene(const EpisodeSpec& spec) const;
   [[nodiscard]] RolloutSetup setup(const EpisodeSpec& spec) const;

@@ -296,7 +296,8 @@ RunSummary run_suite(Suite suite, const std::string& directory, const RunOptions
   try {
     const bool made = experiment.suite().clips.files.empty();
     if (made) ask_for(experiment, experiment.suite().tasks_of_own_clips(), options, run, summary);
-    experiment.prepare(options.threads, progress, {.keep_in = directory, .stop = &stop});
+    const std::string& kept_in = options.clips_in.empty() ? directory : options.clips_in;
+    experiment.prepare(options.threads, progress, {.keep_in = kept_in, .stop = &stop});
     if (!made) ask_for(experiment, tasks_of(experiment.bodies().clips()), options, run, summary);
     run_missing(experiment, options, stop, progress, run, summary);
   } catch (const Stopped&) {

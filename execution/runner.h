@@ -64,9 +64,10 @@ struct RunOptions : EpisodeFilter {
   DecisionOptions decide;  // where asked: runs only until these policies, and no others, are told apart
   std::size_t episodes_per_look = kEpisodesPerLook;  // of a decision
   nlohmann::json certificate;                        // parity certificate that the run keeps; null: none
-  std::function<bool()> stop_asked = {};             // the run then ends resumable, as after an interrupt
-  std::map<std::string, PolicyLoader> called = {};   // how policies are made that the caller brings, by name
-  std::vector<std::string> replaced = {};            // policies whose rows go where they were another policy then
+  std::string clips_in = {};              // prepared clips are kept there, and stay; "": until the run is whole
+  std::function<bool()> stop_asked = {};  // the run then ends resumable, as after an interrupt
+  std::map<std::string, PolicyLoader> called = {};  // how policies are made that the caller brings, by name
+  std::vector<std::string> replaced = {};           // policies whose rows go where they were another policy then
 };
 
 struct RunSummary {

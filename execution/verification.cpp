@@ -85,12 +85,7 @@ class Verifier {
     std::vector<std::string> hashes(keys.size());
     progress_.start("running again", static_cast<int>(keys.size()), "episodes");
     parallel_for_each(static_cast<int>(keys.size()), options_.threads, [&](int i) {
-      const auto place = place_.find(keys[i]);
-      if (place == place_.end())
-        throw InputError(fmt::format("'{}': episode {:.16} is no episode of its suite", run_.path, keys[i]));
-      const EpisodeSpec& spec = plan_[place->second];
-      if (const std::string lack = lack_of(spec); !lack.empty()) throw MissingError(lack);
-      hashes[i] = experiment_.run(spec, {.trajectories = folder, .record_all = true}).state_hash;
+      hashes[i] = experiment_.run(spec_of(keys[i]), {.trajectories = folder, .record_all = true}).state_hash;
       progress_.advance();
     });
     progress_.finish();
@@ -98,6 +93,17 @@ class Verifier {
     for (std::size_t i = 0; i < keys.size(); ++i) by_key[keys[i]] = hashes[i];
     return by_key;
   }
+
+  // Throws InputError for an episode that the suite does not plan, MissingError for one that cannot run here.
+  [[nodiscard]] const EpisodeSpec& spec_of(const std::string& key) const {
+    const auto place = place_.find(key);
+    if (place == place_.end())
+      throw InputError(fmt::format("'{}': episode {:.16} is no episode of its suite", run_.path, key));
+    const EpisodeSpec& spec = plan_[place->second];
+    if (const std::string lack = lack_of(spec); !lack.empty()) throw MissingError(lack);
+    return spec;
+  }
+  [[nodiscard]] const Experiment& experiment() const { return experiment_; }
 
  private:
   // Actors that no row has need not be on this machine.
@@ -308,6 +314,12 @@ std::map<std::string, std::string> record_again(const Run& run, const std::vecto
                                                 const std::string& folder, const VerifyOptions& options,
                                                 Progress& progress) {
   return Verifier(run, options, progress).record(keys, folder);
+}
+
+void with_episode(const Run& run, const std::string& key, const VerifyOptions& options, Progress& progress,
+                  const std::function<void(const Experiment& experiment, const EpisodeSpec& spec)>& use) {
+  const Verifier verifier(run, options, progress);
+  use(verifier.experiment(), verifier.spec_of(key));
 }
 
 std::string other_machine_sentence(const nlohmann::json& environment, const std::string& here) {

@@ -4,11 +4,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "duet/execution/experiment.h"
+#include "duet/experiment/plan/episode.h"
 #include "duet/experiment/work/run_work.h"
 #include "duet/rows/folder/run_directory.h"
 #include "duet/rows/row_file.h"
@@ -61,5 +64,9 @@ Verification verify_run(const Run& run, const VerifyOptions& options, Progress& 
 std::map<std::string, std::string> record_again(const Run& run, const std::vector<std::string>& keys,
                                                 const std::string& folder, const VerifyOptions& options,
                                                 Progress& progress);
+
+// Sets the run up again and gives `use` the experiment with one of its episodes. Throws as record_again.
+void with_episode(const Run& run, const std::string& key, const VerifyOptions& options, Progress& progress,
+                  const std::function<void(const Experiment& experiment, const EpisodeSpec& spec)>& use);
 
 }  // namespace duet

@@ -91,19 +91,25 @@ class PhysicsWorld final : public World {
         meter_(backend, episode.limits) {}
 
   void begin(const RobotState& start) override {
-    backend_.reset(start);
+    tick_ = 0;
     controller_.reset(start);
+    backend_.reset(episode_.restart == nullptr ? start : episode_.restart->start);
   }
-  [[nodiscard]] const RobotState& state() const override { return backend_.state(); }
+  [[nodiscard]] const RobotState& state() const override {
+    return is_recorded() ? episode_.restart->recorded[static_cast<std::size_t>(tick_)] : backend_.state();
+  }
   [[nodiscard]] std::span<const Contact> contacts() const override { return backend_.contacts(); }
 
   const Eigen::VectorXd& target(const Reference& reference) override {
-    controller_.act(disturbance_.seen(backend_.state()), reference, command_);
+    controller_.act(disturbance_.seen(state()), reference, command_);
     disturbance_.send(command_);
     return command_.q_target;
   }
 
   Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) override {
+    const bool was_recorded = is_recorded();
+    tick_ = tick + 1;
+    if (was_recorded) return Outcome::kOk;
     if (!partner.empty())
       backend_.set_partner(partner_joints(partner, tick), partner_velocities(partner, tick, kTickRate));
     disturbance_.act(tick, backend_);
@@ -125,9 +131,12 @@ class PhysicsWorld final : public World {
   }
 
  private:
+  [[nodiscard]] bool is_recorded() const { return episode_.restart != nullptr && tick_ < episode_.restart->tick; }
+
   const Episode& episode_;
   Backend& backend_;
   Controller& controller_;
+  int tick_ = 0;
   int steps_;
   JointCommand command_;
   Disturbance disturbance_;

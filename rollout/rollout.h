@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "duet/backends/backend.h"
@@ -28,6 +29,14 @@ struct GroundForce {
   double peak = 0.0;  // largest magnitude of the mean over 20 ms [N]
 };
 
+// An episode that is taken up again, in an engine, where a recorded one was at a tick. Up to there the source and the
+// controller see the recorded states once more and are then as they were; pushes that have begun by then are over.
+struct EpisodeRestart {
+  std::span<const RobotState> recorded;  // by tick; those before `tick` are used
+  int tick = 0;                          // at which physics begins
+  RobotState start;                      // there
+};
+
 // The conditions of an episode that do not depend on who leads the robot, nor on how long it lasts.
 struct EpisodeConditions {
   RobotState start;
@@ -38,8 +47,9 @@ struct EpisodeConditions {
   FallRule fall;              // the robot's own, RobotModel::fall
   double wall_limit = 120.0;  // what a ReferenceSource takes is not counted (rollout/world.h) [s]
   EpisodeClock clock = {};
-  std::optional<ContactLimits> limits;  // that contacts with a solid partner are held against
-  std::function<bool()> stop_asked;     // polled once a tick; the episode then ends as kTimedOut with `interrupted`
+  std::optional<ContactLimits> limits;      // that contacts with a solid partner are held against
+  std::function<bool()> stop_asked;         // polled once a tick; the episode then ends as kTimedOut with `interrupted`
+  const EpisodeRestart* restart = nullptr;  // outlives the episode; null: physics from the start
 };
 
 struct Episode : EpisodeConditions {

@@ -29,11 +29,6 @@ int exit_code(RunEnd end) {
   return end == RunEnd::kComplete ? kExitOk : end == RunEnd::kInterrupted ? kExitInterrupted : kExitResumable;
 }
 
-int exit_code(const RunSummary& summary) {
-  if (summary.end != RunEnd::kComplete) return exit_code(summary.end);
-  return has_faults(summary.outcomes) ? kExitErrors : kExitOk;
-}
-
 // `how`: the start of its episodes, and the partner.
 std::string describe(const RunSummary& summary, const std::string& how, const std::string& output) {
   std::vector<std::string> outcomes;
@@ -60,6 +55,13 @@ constexpr double kGrace = 1.0;
   std::_Exit(exit_code(end));
 }
 
+}  // namespace
+
+int exit_code(const RunSummary& summary) {
+  if (summary.end != RunEnd::kComplete) return exit_code(summary.end);
+  return has_faults(summary.outcomes) ? kExitErrors : kExitOk;
+}
+
 RunSummary run_watched(Suite suite, const RunArguments& arguments, Progress& progress) {
   const StopToken stop(arguments.options.time_limit, arguments.options.begin);
   const Watchdog watch(stop, kGrace, end_at_once);
@@ -70,6 +72,8 @@ RunSummary run_watched(Suite suite, const RunArguments& arguments, Progress& pro
         fmt::format("{}; the run has stopped and the same command goes on where it stopped", error.what()));
   }
 }
+
+namespace {
 
 // A terminal that is gone does not change how a stopped run ends.
 void print_result(const Session& session, RunEnd end, const std::string& text, const nlohmann::json& json) {
@@ -178,6 +182,12 @@ CLI::Validator time_limit_check() {
 
 }  // namespace
 
+void add_time_limit(CLI::App& command, RunOptions& options) {
+  command
+      .add_option("--time-limit", options.time_limit, "of the command [s], 0 for none; stops resumable (exit code 75)")
+      ->check(time_limit_check());
+}
+
 void add_run(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "run", "roll a suite out in its engines, with the null arm; resumes by itself",
@@ -195,9 +205,7 @@ void add_run(CLI::App& app, Session& session) {
   add_filters(*command, options);
   add_until_decided(*command, *arguments);
   add_threads(command, options.threads);
-  command
-      ->add_option("--time-limit", options.time_limit, "of the command [s], 0 for none; stops resumable (exit code 75)")
-      ->check(time_limit_check());
+  add_time_limit(*command, options);
   command->add_flag("--retry-errors", options.retry_errors,
                     "run episodes again that ended with an error; those that timed out always run again");
   command->add_flag("--tables", arguments->tables, "print every table before the verdict and the board");

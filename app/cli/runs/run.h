@@ -17,6 +17,14 @@ struct RunArguments {
   RunOptions options;
 };
 
+// run_suite into `arguments.output`, ended at once where it is stopped and does not listen. Throws as run_suite; a full
+// disk is said with what goes on where it stopped.
+RunSummary run_watched(Suite suite, const RunArguments& arguments, Progress& progress);
+// 75 or 130 of a run that was stopped, 3 of one with episodes without a result.
+int exit_code(const RunSummary& summary);
+// The option --time-limit.
+void add_time_limit(CLI::App& command, RunOptions& options);
+
 // Runs the suite, says what came of it and sets the session's exit code. Throws as run_suite.
 void run_suite_command(Session& session, RunArguments arguments);
 
