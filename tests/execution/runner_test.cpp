@@ -393,6 +393,7 @@ TEST(Runner, AWalkerIsLedInItsOwnPosture) {
                        .about = "a controller that leaves an elbow alone",
                        .robot = "g1",
                        .walks = true,
+                       .options = {},
                        .posture = {{"left_elbow_joint", 0.25}}},
                       [](const std::shared_ptr<const RobotModel>& robot, const ControllerOptions&) {
                         return make_pd_controller(robot);

@@ -102,6 +102,7 @@ TEST(Perturbation, EveryKindIsWrittenAsItAlwaysWas) {
       {"kick", "{speed: 0.5, first: 2, from: 3, to: 6}"},
       {"friction", "0.4"},
       {"mass", "{add: 3}"},
+      {"actuation", "{law: explicit, armature: 0, dt: 0.001}"},
       {"jitter", "{sigma: 0.02}"},
       {"dropout", "{p: 0.1}"},
       {"perception_latency", "{ms: 200}"},
