@@ -192,16 +192,16 @@ def arms_of(folder):
 def actuation(folder):
     """Success in % and falls of each policy in each engine, by arm."""
     rows, table = [row for row in rows_in(folder) if row["arm"] == "main"], []
+    ran = {engine: name for engine, name in ENGINES.items() if any(row["engine"] == engine for row in rows)}
     for policy, name in policies_and_controls({row["policy"] for row in rows}).items():
         for arm in arms_of(folder):
             line = [name, f"`{arm}`"]
-            for engine in ENGINES:
+            for engine in ran:
                 some = [r for r in rows if (r["policy"], r["perturbation"], r["engine"]) == (policy, arm, engine)]
-                if some:
-                    won = sum(bool(r["success"]) for r in some)
-                    line.append(f"{short(won / len(some))} [{', '.join(wilson(won, len(some)))}]; {sum(r['fell'] for r in some)}/{len(some)}")
+                won = sum(bool(r["success"]) for r in some)
+                line.append(f"{short(won / len(some))} [{', '.join(wilson(won, len(some)))}]; {sum(r['fell'] for r in some)}/{len(some)}")
             table.append(line)
-    return markdown(["Policy", "arm", *[f"{name}: success; fell" for name in ENGINES.values()]], [False] * 2 + [True] * 5, table)
+    return markdown(["Policy", "arm", *[f"{name}: success; fell" for name in ran.values()]], [False] * 2 + [True] * len(ran), table)
 
 
 def actuation_walkers(folder, program):
