@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kEngines = {"mujoco", "bullet", "ode", "simbody", "dart"};
+constexpr std::array kEngines = {"mujoco", "bullet", "ode", "simbody", "dart", "mujoco3", "physx"};
 constexpr std::string_view kPrefix = "duet_", kSuffix = ".so";
 
 // "a:b" -> a, b.
@@ -94,7 +94,7 @@ const Loaded& loaded(const std::string& name) {
   return entry->second;
 }
 
-// Names of engines: the benchmark's, then what else has a module.
+// Names of engines: our own, whether their modules are here or not, then what else has a module.
 std::vector<std::string> engine_names() {
   std::vector<std::string> names(kEngines.begin(), kEngines.end());
   std::vector<std::string> others;

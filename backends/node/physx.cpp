@@ -53,7 +53,7 @@ const EngineModule kModule = {.name = "physx",
                               .make = make,
                               .options = physx_options(),
                               .deviations = kDeviations,
-                              .no_solid_partner = "its host has no people who touch",
+                              .no_solid_partner = "compliant contacts of its package have no damper",
                               .absence = absence};
 
 }  // namespace
