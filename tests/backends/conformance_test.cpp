@@ -81,7 +81,10 @@ INSTANTIATE_TEST_SUITE_P(Engines, Conformance,
 TEST(ConformanceGroup, OfTheLawHoldsAllThatAnotherLawFails) {
   for (const std::string& engine : physics_engines()) {
     if (!absence(engine).empty()) continue;
-    const EngineReport report = run_suite(engine, {.law = TorqueLaw::kExplicit, .armature = 0.0});
+    Settings bare;
+    bare.law = TorqueLaw::kExplicit;
+    bare.armature = 0.0;
+    const EngineReport report = run_suite(engine, bare);
     int failed = 0;
     for (const SceneReport& scene : report.scenes)
       for (const Measurement& found : scene.run.measurements) {
