@@ -56,15 +56,9 @@ std::vector<OptionSection> engine_option_sections() {
   std::vector<OptionSection> sections;
   for (const EngineInfo& engine : engines()) {
     if (engine.module == nullptr) continue;
-    std::vector<FieldRow> rows;
-    for (const EngineOption& option : engine.module->options) {
-      const FieldRange range = {option.low, option.high};
-      const std::string values = !option.choices.empty() ? fmt::format("{}", fmt::join(option.choices, ", "))
-                                 : option.whole          ? values_of_whole(range, option.low, option.high)
-                                                         : values_of_number(range, "");
-      rows.push_back({option.name, values, option.value, option.meaning});
-    }
-    sections.push_back({engine.name, std::move(rows)});
+    const std::span<const EngineOption> options = engine.module->options;
+    sections.push_back(
+        {engine.name, field_rows(FieldTable<EngineOptions>(options.begin(), options.end()), EngineOptions())});
   }
   return sections;
 }

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "duet/backends/backend.h"
+#include "duet/core/field.h"
 #include "duet/core/share.h"
 
 namespace duet {
@@ -29,16 +30,9 @@ struct EngineDeviation {
   bool only_at_full_effort = false;  // only the smaller or larger steps of full effort show it
 };
 
-// The settings that an engine's module offers, declared once: what `duet list`, profiles and error messages say.
-
-struct EngineOption {
-  std::string name;
-  std::string value;                 // the default, as text
-  std::vector<std::string> choices;  // where not empty, one of these; else a number in [low, high]
-  double low = 0.0, high = 0.0;
-  bool whole = false;   // whole numbers only
-  std::string meaning;  // with its unit
-};
+// A setting that an engine's module offers, declared once: a field (core/field.h) of the options by name, which says
+// the default of one that is not there. `duet list`, profiles and error messages are made from it.
+using EngineOption = Field<EngineOptions>;
 
 EngineOption number_option(std::string name, double value, double low, double high, std::string meaning);
 EngineOption integer_option(std::string name, int value, int low, int high, std::string meaning);
@@ -158,8 +152,8 @@ inline std::uint64_t engine_interface() {
   digest.add_type(&JointCommand::q_target, &JointCommand::kp, &JointCommand::kd, &JointCommand::tau_ff);
   digest.add_type(&Contact::link, &Contact::side, &Contact::other, &Contact::p_WC, &Contact::f_W, &Contact::depth);
   digest.add_type(&Snapshot::values);
-  digest.add_type(&EngineOption::name, &EngineOption::value, &EngineOption::choices, &EngineOption::low,
-                  &EngineOption::high, &EngineOption::whole, &EngineOption::meaning);
+  digest.add_type(&FieldDoc::name, &FieldDoc::meaning, &FieldDoc::unit, &FieldDoc::range, &FieldDoc::choices);
+  digest.add_type(&EngineOption::values, &EngineOption::text, &EngineOption::assign);
   digest.add_type(&EngineDeviation::scene, &EngineDeviation::quantity, &EngineDeviation::reason,
                   &EngineDeviation::bound, &EngineDeviation::only_at_full_effort);
   digest.add_type(&EngineModule::interface, &EngineModule::built_with, &EngineModule::name, &EngineModule::version,

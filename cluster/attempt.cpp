@@ -44,31 +44,21 @@ std::string plain(const std::string& name) {
   return text.empty() ? "node" : text;
 }
 
-std::string header_line(const AttemptHeader& header) {
-  return dumped(nlohmann::json({{"schema", kAttemptSchema},
-                                {"shard", header.shard},
-                                {"node", header.node},
-                                {"pid", header.pid},
-                                {"plan", header.plan},
-                                {"started_at", header.started_at},
-                                {"environment", header.environment}}));
+}  // namespace
+
+template <>
+const JsonSchema<AttemptHeader>& json_schema<AttemptHeader>() {
+  using H = AttemptHeader;
+  static const JsonSchema<H> schema = {{{"shard"}, &H::shard},
+                                       {{"node"}, &H::node},
+                                       {{"pid"}, &H::pid},
+                                       {{"plan"}, &H::plan},
+                                       {{"started_at"}, &H::started_at},
+                                       {{"environment"}, &H::environment}};
+  return schema;
 }
 
-AttemptHeader read_header(std::string_view line, const std::string& path) {
-  const nlohmann::json json = parse_json(line, path);
-  JsonFields fields(json, path + ":1");
-  if (const std::string schema = fields.text("schema"); schema != kAttemptSchema)
-    throw InputError(fmt::format("{}:1: expected schema {}, found {}", path, kAttemptSchema, excerpt(schema)));
-  AttemptHeader header;
-  header.shard = fields.integer("shard");
-  header.node = fields.text("node");
-  header.pid = fields.integer("pid");
-  header.plan = fields.text("plan");
-  header.started_at = fields.text("started_at");
-  header.environment = fields.at("environment");
-  fields.refuse_unknown();
-  return header;
-}
+namespace {
 
 std::vector<std::string_view> words_of(std::string_view line) {
   std::vector<std::string_view> words;
@@ -159,7 +149,7 @@ AttemptWriter::AttemptWriter(const std::string& run, const AttemptHeader& header
   descriptor_ = ::open(journal_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (descriptor_ < 0)
     throw StorageError(fmt::format("cannot write '{}': {}", journal_, std::generic_category().message(errno)));
-  say(header_line(header));
+  say(dumped(json_document(kAttemptSchema, header)));
 }
 
 AttemptWriter::~AttemptWriter() { ::close(descriptor_); }
@@ -201,7 +191,7 @@ std::optional<AttemptRecord> parse_journal(std::string_view text, const std::str
   const std::size_t first = text.find('\n');
   if (first == std::string_view::npos) return std::nullopt;
   AttemptRecord record;
-  record.header = read_header(text.substr(0, first), path);
+  record.header = read_document<AttemptHeader>(text.substr(0, first), path + ":1", kAttemptSchema);
   for (std::size_t begin = first + 1; begin < text.size();) {
     const std::size_t end = text.find('\n', begin);
     if (end == std::string_view::npos) break;

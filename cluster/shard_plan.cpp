@@ -78,59 +78,64 @@ void cut_engine(const EngineBlocks& engine, std::vector<Shard>& shards) {
   }
 }
 
-json to_json(const Shard& shard) {
-  json object = {{"name", shard.name}, {"begin", shard.begin}, {"end", shard.end}, {"cost_s", shard.cost}};
-  if (!shard.keys.empty()) object["keys"] = shard.keys;
-  if (const PlannedTraining& training = shard.training; !training.train.empty())
-    object.update(
-        {{"train", training.train}, {"arm", training.arm}, {"seed", training.seed}, {"options", training.options}});
-  return object;
-}
-
 [[noreturn]] void fail_plan(const std::string& what, const std::string& expected) {
   throw InputError(fmt::format("{}: expected {}", what, expected));
 }
 
-const json& list_at(JsonFields& fields, const std::string& key, const std::string& what) {
-  const json& list = fields.at(key);
-  if (!list.is_array()) fail_plan(what, fmt::format("a list under the key '{}'", key));
-  return list;
+const JsonSchema<Shard>& shard_schema(Kind kind) {
+  using S = Shard;
+  static const JsonSchema<S> common = {{{"name"}, &S::name},
+                                       {{"begin"}, &S::begin},
+                                       {{"end"}, &S::end},
+                                       {{.name = "cost_s", .unit = "s", .range = {.low = 0.0}}, &S::cost}};
+  static const JsonSchema<S> episodes = [] {
+    JsonSchema<S> keys = common;
+    keys.emplace_back(FieldDoc{"keys"}, &S::keys);
+    return keys;
+  }();
+  static const JsonSchema<S> trainings = [] {
+    using T = PlannedTraining;
+    JsonSchema<S> keys = common;
+    for (JsonKey<S>& key : json_keys<S, T>(
+             &S::training,
+             {{{"train"}, &T::train}, {{"arm"}, &T::arm}, {{"seed"}, &T::seed}, {{"options"}, &T::options}}))
+      keys.push_back(std::move(key));
+    return keys;
+  }();
+  return kind == Kind::kEpisodes ? episodes : trainings;
 }
 
 // Everything that `duet train` is told follows from these, and all of it is known.
-PlannedTraining read_training(JsonFields& fields, const std::string& name, const std::string& what) {
-  PlannedTraining training{fields.text("train"), fields.text("arm"), fields.unsigned_integer("seed"), {}};
-  const json& options = fields.at("options");
-  if (!options.is_object()) fail_plan(what, "an object under the key 'options'");
-  for (const auto& [option, value] : options.items()) {
-    if (!value.is_string()) fail_plan(what, fmt::format("a text under the option '{}'", excerpt(option)));
-    check_training_option(training.train, option, value.get<std::string>(), what);
-    training.options[option] = value.get<std::string>();
-  }
+void check_training(const Shard& shard, const std::string& what) {
+  const PlannedTraining& training = shard.training;
   const std::vector<std::string> known = training_names();
   if (std::ranges::find(known, training.train) == known.end())
     throw InputError(fmt::format("{}: {}", what, unknown_name_message("training", training.train, known)));
+  for (const auto& [option, value] : training.options) check_training_option(training.train, option, value, what);
   if (!is_arm_name(training.arm))
     fail_plan(what, fmt::format("an arm of letters, digits, '_' and '.', found '{}'", excerpt(training.arm)));
-  if (name != training.name())
-    fail_plan(what, fmt::format("the name '{}' of its arm and seed, found '{}'", training.name(), excerpt(name)));
-  return training;
+  if (shard.name != training.name())
+    fail_plan(what, fmt::format("the name '{}' of its arm and seed, found '{}'", training.name(), excerpt(shard.name)));
 }
 
-Shard read_shard(const json& object, Kind kind, const std::string& what) {
-  JsonFields fields(object, what);
-  Shard shard;
-  shard.name = fields.text("name");
-  shard.begin = fields.integer("begin");
-  shard.end = fields.integer("end");
-  shard.cost = fields.number("cost_s");
-  if (kind == Kind::kEpisodes) shard.keys = fields.text("keys");
-  if (kind == Kind::kTrainings) shard.training = read_training(fields, shard.name, what);
-  fields.refuse_unknown();
-  if (shard.begin < 0 || shard.end <= shard.begin || shard.end - shard.begin > 10'000'000)
-    fail_plan(what, fmt::format("0 <= begin < end, found {} and {}", shard.begin, shard.end));
-  if (shard.cost < 0.0) fail_plan(what, fmt::format("a cost_s of at least 0, found {}", shard.cost));
-  return shard;
+JsonKey<ShardPlan> shards_key() {
+  const auto write = [](const ShardPlan& plan) {
+    json list = json::array();
+    for (const Shard& shard : plan.shards) list.push_back(json_mapping(shard, shard_schema(plan.kind)));
+    return list;
+  };
+  const auto read = [](const JsonNode& list, ShardPlan& plan) {
+    list.require_list();
+    for (std::size_t i = 0; i < list.value().size(); ++i) {
+      const JsonNode node = list.element(i);
+      Shard& shard = plan.shards.emplace_back();
+      read_mapping(node, shard_schema(plan.kind), shard);
+      if (plan.kind == Kind::kTrainings) check_training(shard, node.place());
+      if (shard.end <= shard.begin || shard.end - shard.begin > 10'000'000)
+        fail_plan(node.place(), fmt::format("0 <= begin < end, found {} and {}", shard.begin, shard.end));
+    }
+  };
+  return {{"shards"}, "list of objects", write, read};
 }
 
 // Each episode is in one shard.
@@ -147,25 +152,36 @@ void check_ranges(const ShardPlan& plan, const std::string& path) {
     fail_plan(path, fmt::format("shards of {} episodes together, found {}", plan.episodes, all));
 }
 
-ProgramDigests read_program(JsonFields& fields, const std::string& path) {
-  const json& program = fields.at("program");
-  const auto is_text = [](const json& digest) { return digest.is_string(); };
-  if (!program.is_object() || !std::ranges::all_of(program, is_text) || !program.contains("duet"))
-    fail_plan(path, "an object of digests, 'duet' among them, under the key 'program'");
-  return program.get<ProgramDigests>();
-}
-
-PlannedClip read_clip(const json& object, const std::string& what) {
-  JsonFields fields(object, what);
-  PlannedClip clip{fields.text("task"), fields.text("id"), fields.text("file"), fields.text("sha256")};
-  fields.refuse_unknown();
+void check_clip(const PlannedClip& clip, const std::string& path) {
   const std::filesystem::path file = std::filesystem::path(clip.file).lexically_normal();
   if (file.empty() || file.is_absolute() || *file.begin() == "..")
-    fail_plan(what, fmt::format("a file below the run directory, found '{}'", excerpt(clip.file)));
-  return clip;
+    fail_plan(fmt::format("{}: clip '{}'", path, excerpt(clip.id)),
+              fmt::format("a file below the run directory, found '{}'", excerpt(clip.file)));
 }
 
 }  // namespace
+
+template <>
+const JsonSchema<PlannedClip>& json_schema<PlannedClip>() {
+  using C = PlannedClip;
+  static const JsonSchema<C> schema = {
+      {{"task"}, &C::task}, {{"id"}, &C::id}, {{"file"}, &C::file}, {{"sha256"}, &C::sha256}};
+  return schema;
+}
+
+// The kind comes first: it says which keys a shard has.
+template <>
+const JsonSchema<ShardPlan>& json_schema<ShardPlan>() {
+  using P = ShardPlan;
+  static const JsonSchema<P> schema = {{{.name = "kind", .choices = {"episodes", "trainings"}}, &P::kind},
+                                       {{"program"}, &P::program},
+                                       {{"suite_hash"}, &P::suite_hash},
+                                       {{"episodes"}, &P::episodes},
+                                       {{"clips"}, &P::clips},
+                                       {finite_key("costs"), &P::costs},
+                                       shards_key()};
+  return schema;
+}
 
 std::vector<Shard> cut_shards(const std::vector<PlanBlock>& blocks, std::int64_t count) {
   std::vector<EngineBlocks> engines = by_engine(blocks);
@@ -194,15 +210,7 @@ std::string plan_file(const std::string& run) { return (std::filesystem::path(ru
 bool has_shard_plan(const std::string& run) { return std::filesystem::exists(plan_file(run)); }
 
 void write_shard_plan(const ShardPlan& plan, const std::string& run) {
-  json clips = json::array(), shards = json::array();
-  for (const PlannedClip& clip : plan.clips)
-    clips.push_back({{"task", clip.task}, {"id", clip.id}, {"file", clip.file}, {"sha256", clip.sha256}});
-  for (const Shard& shard : plan.shards) shards.push_back(to_json(shard));
-  const json object = {{"schema", kPlanSchema},     {"kind", plan.kind == Kind::kEpisodes ? "episodes" : "trainings"},
-                       {"program", plan.program},   {"suite_hash", plan.suite_hash},
-                       {"episodes", plan.episodes}, {"clips", std::move(clips)},
-                       {"costs", plan.costs},       {"shards", std::move(shards)}};
-  write_file(join_without_links(run, "plan.json"), dumped(object, 1) + "\n");
+  write_file(join_without_links(run, "plan.json"), dumped(json_document(kPlanSchema, plan), 1) + "\n");
 }
 
 ShardPlan read_shard_plan(const std::string& run) {
@@ -210,24 +218,10 @@ ShardPlan read_shard_plan(const std::string& run) {
   if (!has_shard_plan(run))
     throw InputError(fmt::format("'{}' is no run that was planned (no plan.json): `duet plan` makes one", run));
   require_plain_files(run);
-  const json object = parse_json(read_text(path), path);
-  JsonFields fields(object, path);
-  if (const std::string schema = fields.text("schema"); schema != kPlanSchema)
-    fail_plan(path, fmt::format("schema {}, found {}", kPlanSchema, excerpt(schema)));
-  const std::string kind = fields.text("kind");
-  if (kind != "episodes" && kind != "trainings")
-    fail_plan(path, fmt::format("kind 'episodes' or 'trainings', found '{}'", excerpt(kind)));
-  ShardPlan plan;
-  plan.kind = kind == "episodes" ? Kind::kEpisodes : Kind::kTrainings;
-  plan.program = read_program(fields, path);
-  plan.suite_hash = fields.text("suite_hash");
-  plan.episodes = fields.integer("episodes");
-  plan.costs = fields.numbers("costs", false);
-  for (const json& clip : list_at(fields, "clips", path))
-    plan.clips.push_back(read_clip(clip, fmt::format("{}: clip {}", path, plan.clips.size())));
-  for (const json& shard : list_at(fields, "shards", path))
-    plan.shards.push_back(read_shard(shard, plan.kind, fmt::format("{}: shard {}", path, plan.shards.size())));
-  fields.refuse_unknown();
+  auto plan = read_document<ShardPlan>(read_text(path), path, kPlanSchema);
+  if (!plan.program.contains("duet"))
+    fail_plan(path, "the digest of 'duet' among others under the key 'program', found none");
+  for (const PlannedClip& clip : plan.clips) check_clip(clip, path);
   if (std::ssize(plan.shards) > kMostShards) fail_plan(path, fmt::format("at most {} shards", kMostShards));
   check_ranges(plan, path);
   return plan;

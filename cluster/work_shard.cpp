@@ -32,7 +32,7 @@
 #include "duet/execution/runner.h"
 #include "duet/experiment/suite_file/suite_key.h"
 #include "duet/experiment/work/run_work.h"
-#include "duet/robots/yaml_section.h"
+#include "duet/robots/yaml_schema.h"
 #include "duet/rows/merge/merge_files.h"
 #include "duet/rows/row_file.h"
 
@@ -270,13 +270,11 @@ void read_arms(const YamlSection& top, TrainingList& list) {
   std::vector<std::string> common;
   if (top.has("arguments")) common = texts_of(top.node("arguments"), top, "arguments");
   const YAML::Node arms = top.node("arms");
-  if (!arms.IsMap() || arms.size() == 0)
-    top.fail(top.line("arms"), fmt::format("arms: expected a mapping of names, found {}", describe(arms)));
+  if (!arms.IsMap() || arms.size() == 0) top.refuse_key("arms", "a mapping of names", arms);
   for (const auto& arm : arms) {
     const std::string name = arm.first.Scalar();
     if (!is_arm_name(name))
-      top.fail(top.line("arms"),
-               fmt::format("arms: expected names of letters, digits, '_' and '.', found '{}'", excerpt(name)));
+      top.fail_key("arms", fmt::format("expected names of letters, digits, '_' and '.', found '{}'", excerpt(name)));
     const std::string what = fmt::format("arm '{}'", name);
     std::vector<std::string> words = common;
     for (std::string& word : texts_of(arm.second, top, what)) words.push_back(std::move(word));
@@ -293,11 +291,10 @@ void read_seeds(const YamlSection& top, TrainingList& list) {
     std::uint64_t seed = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
     if (error != std::errc() || end != text.data() + text.size())
-      top.fail(top.line("seeds"),
-               fmt::format("seeds: expected whole numbers of at least 0, found '{}'", excerpt(text)));
+      top.fail_key("seeds", fmt::format("expected whole numbers of at least 0, found '{}'", excerpt(text)));
     list.seeds.push_back(seed);
   }
-  if (list.seeds.empty()) top.fail(top.line("seeds"), "seeds: expected one at least, found none");
+  if (list.seeds.empty()) top.fail_key("seeds", "expected one at least, found none");
 }
 
 // The number that a child ended with, as a shell says it.
@@ -341,8 +338,7 @@ std::string ending_of(int code) {
 TrainingList parse_trainings(const std::string& yaml, const std::string& file) {
   const YamlSection top(file, parse_yaml(yaml, file), "trainings",
                         {"schema", "train", "arguments", "arms", "seeds", "minutes"});
-  if (const std::string schema = top.text("schema"); schema != kTrainingsSchema)
-    top.fail(top.line("schema"), fmt::format("expected schema {}, found {}", kTrainingsSchema, excerpt(schema)));
+  top.require_schema(kTrainingsSchema);
   TrainingList list;
   list.train = top.text("train");
   const std::vector<std::string> known = training_names();
@@ -350,10 +346,7 @@ TrainingList parse_trainings(const std::string& yaml, const std::string& file) {
     top.fail(top.line("train"), unknown_name_message("training", list.train, known));
   read_arms(top, list);
   read_seeds(top, list);
-  list.minutes = top.optional_number("minutes").value_or(list.minutes);
-  if (list.minutes <= 0.0 || list.minutes > kMostMinutes)
-    top.fail(top.line("minutes"),
-             fmt::format("minutes: expected above 0 to {:g}, found {:g}", kMostMinutes, list.minutes));
+  read_optional(top, {.name = "minutes", .unit = "min", .range = {0.0, kMostMinutes, false}}, list.minutes);
   return list;
 }
 

@@ -44,8 +44,7 @@ std::string label(const char* what, const YAML::Node& node, const char* key) {
 std::vector<std::string> names_in(const YamlSection& section, const char* key) {
   std::vector<std::string> values;
   for (const YAML::Node& item : section.items(key)) {
-    if (!item.IsScalar())
-      section.fail(section.line(key), fmt::format("'{}': expected names, found {}", key, describe(item)));
+    if (!item.IsScalar()) section.refuse_key(key, "names", item);
     values.push_back(item.Scalar());
   }
   return values;
@@ -90,8 +89,7 @@ const Schema<OtherJoint>& other_joint_schema() {
 void read_limits(const YamlSection& s, CommandRange& range) {
   std::vector<double> limits;
   read_value(s, {"limits"}, limits);
-  if (limits.size() != 2 || limits[0] > limits[1])
-    s.fail(s.line("limits"), fmt::format("'limits': expected [lower, upper], found {}", describe(s.node("limits"))));
+  if (limits.size() != 2 || limits[0] > limits[1]) s.refuse_key("limits", "[lower, upper]", s.node("limits"));
   range.lower = limits[0];
   range.upper = limits[1];
 }
@@ -133,10 +131,10 @@ void read_gait(const SchemaSection& s, Channel& channel) {
       optional_key({"stance"}, &GaitClock::stance)};
   for (const SchemaKey<GaitClock>& key : schema) key.read(s, gait);
   if (!gait.standing.empty() && gait.standing.size() != gait.phases.size())
-    s.fail(s.line("standing"), fmt::format("'standing': expected one number for each of the {} phases, found {}",
-                                           gait.phases.size(), gait.standing.size()));
+    s.fail_key("standing", fmt::format("expected one number for each of the {} phases, found {}", gait.phases.size(),
+                                       gait.standing.size()));
   if (gait.stance && (*gait.stance <= 0.0 || *gait.stance >= 1.0))
-    s.fail(s.line("stance"), fmt::format("'stance': expected a number in (0, 1), found {}", *gait.stance));
+    s.fail_key("stance", fmt::format("expected a number in (0, 1), found {}", *gait.stance));
 }
 
 // The kind; keys of other kinds are refused.
@@ -176,7 +174,7 @@ void read_steps(const YamlSection& s, Channel& channel) {
 
 void read_rate(const YamlSection& root, Descriptor&) {
   if (const double rate = root.number("rate_hz"); rate != kTickRate)
-    root.fail(root.line("rate_hz"), fmt::format("'rate_hz': expected {}, found {}", kTickRate, rate));
+    root.fail_key("rate_hz", fmt::format("expected {}, found {}", kTickRate, rate));
 }
 
 // Reads one descriptor; its members are the state that the steps share.
@@ -223,15 +221,13 @@ class Reader {
       DescriptorJoint joint;
       joint.around_reference = around_reference_;
       const YamlSection s = read_mapping(file_, node, label("joint", node, "name"), joint_schema(), joint);
-      if (s.has("around") && !joint.action)
-        s.fail(s.line("around"), "'around': expected the key 'action' beside it, found none");
+      if (s.has("around") && !joint.action) s.fail_key("around", "expected the key 'action' beside it, found none");
       refuse_repeat(s, joint.name);
       out_.joints.push_back(joint);
       joint_names_.push_back(joint.name);
     }
-    if (out_.joints.empty()) root.fail(root.line("joints"), "'joints': expected at least one, found none");
-    if (out_.actions() == 0)
-      root.fail(root.line("joints"), "'joints': expected one that has the key 'action', found none");
+    if (out_.joints.empty()) root.fail_key("joints", "expected at least one, found none");
+    if (out_.actions() == 0) root.fail_key("joints", "expected one that has the key 'action', found none");
   }
 
   void read_other_joints(Top root) {
@@ -261,9 +257,7 @@ class Reader {
 
   void read_groups(Top root) {
     const YAML::Node node = root.node("observation");
-    if (!node.IsMap() || node.size() == 0)
-      root.fail(root.line("observation"),
-                fmt::format("'observation': expected groups of channels by name, found {}", describe(node)));
+    if (!node.IsMap() || node.size() == 0) root.refuse_key("observation", "groups of channels by name", node);
     for (const auto& entry : node) {
       ChannelGroup group{.name = entry.first.Scalar(), .line = line_of(entry.first), .channels = {}};
       if (!entry.second.IsSequence() || entry.second.size() == 0)
@@ -311,7 +305,7 @@ class Reader {
     for (const std::string& name : names_in(s, "zero")) {
       const auto it = std::ranges::find(channel.joints, place_of(s, "zero", "joint", name, joint_names_));
       if (it == channel.joints.end())
-        s.fail(s.line("zero"), fmt::format("'zero': expected joints of the channel, found '{}'", name));
+        s.fail_key("zero", fmt::format("expected joints of the channel, found '{}'", name));
       channel.zeroed[it - channel.joints.begin()] = true;
     }
   }
@@ -321,7 +315,7 @@ class Reader {
     const int size = channel_size(channel, out_.widths());
     const int given = static_cast<int>(channel.scale.size());
     if (given != 1 && given != size)
-      s.fail(s.line("scale"), fmt::format("'scale': expected 1 or {} numbers, found {}", size, given));
+      s.fail_key("scale", fmt::format("expected 1 or {} numbers, found {}", size, given));
   }
 
   // Channels that show a command to stand need to be told which command is one.
@@ -350,11 +344,10 @@ class Reader {
       const YamlSection s = read_mapping(file_, node, label("input", node, "name"), schema, input);
       if (!input.parts.empty() && !input.state.empty())
         s.fail(s.line("state"), "expected 'parts' or 'state', found both");
-      if (input.parts.empty() && input.state.empty())
-        s.fail(s.line("parts"), "'parts': expected at least one, found none");
+      if (input.parts.empty() && input.state.empty()) s.fail_key("parts", "expected at least one, found none");
       out_.observation.inputs.push_back(std::move(input));
     }
-    if (out_.observation.inputs.empty()) root.fail(root.line("inputs"), "'inputs': expected at least one, found none");
+    if (out_.observation.inputs.empty()) root.fail_key("inputs", "expected at least one, found none");
   }
 
   static Schema<HistoryRule> history_schema() {
@@ -370,7 +363,7 @@ class Reader {
     part.line = s.line();
     for (const std::string& name : names_in(s, "groups"))
       part.groups.push_back(place_of(s, "groups", "group", name, group_names_));
-    if (part.groups.empty()) s.fail(s.line("groups"), "'groups': expected at least one, found none");
+    if (part.groups.empty()) s.fail_key("groups", "expected at least one, found none");
   }
 
   std::string file_;

@@ -21,10 +21,6 @@ std::optional<double> number_of(std::string_view text) {
   return parse_number(text);
 }
 
-bool is_in(const FieldRange& range, double value) {
-  return value <= range.high && (range.with_low ? value >= range.low : value > range.low);
-}
-
 FieldRange whole_range(const FieldRange& range, double least, double most) {
   return {std::max(range.low, std::max(least, -kLargestWhole)), std::min(range.high, std::min(most, kLargestWhole))};
 }
@@ -35,6 +31,10 @@ std::string lowered(std::string text) {
 }
 
 }  // namespace
+
+bool contains(const FieldRange& range, double value) {
+  return value <= range.high && (range.with_low ? value >= range.low : value > range.low);
+}
 
 std::string values_of_number(const FieldRange& range, const std::string& unit) {
   const std::string of_unit = unit.empty() ? "" : " " + unit;
@@ -53,7 +53,7 @@ std::string values_of_whole(const FieldRange& range, double least, double most) 
 
 std::string assign_value(const FieldDoc& words, const std::string& text, const FieldRange& range, double& out) {
   const std::optional<double> value = number_of(text);
-  if (!value || !is_in(range, *value)) return values_of_number(range, words.unit);
+  if (!value || !contains(range, *value)) return values_of_number(range, words.unit);
   out = *value;
   return "";
 }
@@ -63,21 +63,25 @@ std::string assign_value(const FieldDoc& words, const std::string& text, const F
   const auto is = [&](std::initializer_list<const char*> known) {
     return std::any_of(known.begin(), known.end(), [&](const char* name) { return word == name; });
   };
-  const bool on = is({"true", "on", "yes", "y"}) || text == words.choices.at(1);
-  if (!on && !is({"false", "off", "no", "n"}) && text != words.choices.at(0))
-    return fmt::format("{}", fmt::join(words.choices, ", "));
+  const bool is_flag = words.choices.at(0) == "false" || words.choices.at(0) == "off";
+  const bool on = text == words.choices.at(1) || (is_flag && is({"true", "on", "yes", "y"}));
+  if (!on && text != words.choices.at(0) && !(is_flag && is({"false", "off", "no", "n"})))
+    return words.choices == flag_words() ? "true or false" : fmt::format("{}", fmt::join(words.choices, ", "));
   out = on;
   return "";
 }
 
-std::string assign_value(const FieldDoc&, const std::string& text, const FieldRange&, std::string& out) {
+std::string assign_value(const FieldDoc& words, const std::string& text, const FieldRange&, std::string& out) {
+  std::size_t index = 0;
+  if (!words.choices.empty())
+    if (std::string expected = assign_choice(words, text, index); !expected.empty()) return expected;
   out = text;
   return "";
 }
 
 std::string assign_whole(const std::string& text, const FieldRange& range, double least, double most, double& out) {
   const std::optional<double> value = number_of(text);
-  if (!value || *value != std::floor(*value) || !is_in(whole_range(range, least, most), *value))
+  if (!value || *value != std::floor(*value) || !contains(whole_range(range, least, most), *value))
     return values_of_whole(range, least, most);
   out = *value;
   return "";
@@ -95,10 +99,14 @@ std::string value_text(const FieldDoc& words, bool value) { return words.choices
 std::string value_text(const FieldDoc&, const std::string& value) { return value; }
 std::string whole_text(std::int64_t value) { return fmt::format("{}", value); }
 
-std::string field_refusal(const FieldDoc& words, const std::string& expected, const std::string& text) {
+std::vector<std::string> flag_words() { return {"false", "true"}; }
+
+std::string field_refusal(const FieldDoc& words, const std::string& expected, const std::string& text,
+                          std::string_view of) {
   if (words.choices.size() > 2 || (!words.choices.empty() && words.choices[1] != "true"))
     return unknown_name_message(words.name, text, words.choices);
-  return fmt::format("{}: expected {}, found {}", words.name, expected,
+  const std::string place = of.empty() ? words.name : fmt::format("{} '{}'", of, words.name);
+  return fmt::format("{}: expected {}, found {}", place, expected,
                      number_of(text) ? text : fmt::format("'{}'", excerpt(text)));
 }
 

@@ -2,6 +2,7 @@
 // such a struct, and what `duet list`, --help and docs/reference are made from. Tables are constants; thread-safe.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -23,7 +24,11 @@ struct FieldRange {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
   bool with_low = true;  // whether `low` itself is allowed
+
+  [[nodiscard]] bool is_set() const { return std::isfinite(low) || std::isfinite(high); }
 };
+
+bool contains(const FieldRange& range, double value);  // false for NaN
 
 // The name and the meaning of a field. `choices` are the texts of an enumeration in the order of its enumerators from
 // 0, or of a flag: off, then on.
@@ -33,6 +38,8 @@ struct FieldDoc {
   std::string unit = {};     // "" where it has none
   FieldRange range = {};
   std::vector<std::string> choices = {};
+  bool finite = false;    // of a number in JSON: null is no value of it
+  bool optional = false;  // of a key in JSON: absent where its value is null or empty
 };
 
 // A field of an Owner. `text` gives its value as reading takes it ("" for an empty text or optional); two values with
@@ -69,8 +76,13 @@ std::string whole_text(std::int64_t value);
 std::string values_of_number(const FieldRange& range, const std::string& unit);
 std::string values_of_whole(const FieldRange& range, double least, double most);
 
-// "KEY: expected WHAT, found TEXT"; of a choice the sentence that asks "did you mean".
-std::string field_refusal(const FieldDoc& words, const std::string& expected, const std::string& text);
+// "key 'NAME': expected WHAT, found TEXT"; of a choice the sentence that asks "did you mean". `of`: "option";
+// "" for a name that says itself what it is ("--height").
+std::string field_refusal(const FieldDoc& words, const std::string& expected, const std::string& text,
+                          std::string_view of = "key");
+
+// The texts of a flag that has no others.
+std::vector<std::string> flag_words();
 
 template <typename T>
 struct OptionalValue : std::false_type {
@@ -140,7 +152,7 @@ template <typename Owner, typename Member>
 Field<Owner> field(FieldDoc words, Member member) {
   using Value = std::remove_cvref_t<std::invoke_result_t<Member, Owner&>>;
   if constexpr (std::is_same_v<Value, bool>)
-    if (words.choices.empty()) words.choices = {"false", "true"};
+    if (words.choices.empty()) words.choices = flag_words();
   Field<Owner> made;
   static_cast<FieldDoc&>(made) = std::move(words);
   made.values = field_values<Value>(made, made.range);
@@ -193,11 +205,12 @@ void raise_default(const Field<Owner>& known, Owner& owner) {
   set_field(known, owner, value_text(known, known.least(owner)));
 }
 
-template <typename Owner>
-std::vector<std::string> field_names(const FieldTable<Owner>& table) {
+// The names of a table's fields or keys.
+template <typename Table>
+std::vector<std::string> field_names(const Table& table) {
   std::vector<std::string> names;
   names.reserve(table.size());
-  for (const Field<Owner>& known : table) names.push_back(known.name);
+  for (const auto& known : table) names.push_back(known.name);
   return names;
 }
 
@@ -242,7 +255,8 @@ Owner read_options(std::string_view of, std::string_view name, const FieldTable<
     const Field<Owner>& known = *find_field(table, option);
     const std::string expected = set_field(known, defaults, text);
     if (!expected.empty())
-      require(false, std::string(of) + " '" + std::string(name) + "': " + field_refusal(known, expected, text));
+      require(false,
+              std::string(of) + " '" + std::string(name) + "': " + field_refusal(known, expected, text, "option"));
   }
   return defaults;
 }

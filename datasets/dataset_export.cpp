@@ -117,8 +117,8 @@ class Export {
     for (std::size_t begin = 0; begin < text.size();) {
       const std::size_t end = std::min(text.find('\n', begin), text.size());
       json row = parse_json(std::string_view(text).substr(begin, end - begin), "'" + file + "'");
-      JsonFields fields(row, "'" + file + "'");
-      const std::string name = fields.text("robot") + "/" + fields.text("clip");
+      const JsonNode node(row, "'" + file + "'");
+      const std::string name = json_at<std::string>(node, "robot") + "/" + json_at<std::string>(node, "clip");
       rows_[name] = std::move(row);
       begin = end + 1;
     }

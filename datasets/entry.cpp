@@ -20,83 +20,56 @@ using nlohmann::json;
 
 constexpr std::array kStatuses = {ClipStatus::kKept, ClipStatus::kRejected, ClipStatus::kOther, ClipStatus::kFailed};
 
-json json_of(const std::vector<NamedDigest>& files) {
-  json list = json::array();
-  for (const NamedDigest& file : files) list.push_back({{"file", file.file}, {"sha256", file.sha256}});
-  return list;
-}
-
-json json_of(const std::map<std::string, double>& values) {
-  json object = json::object();
-  for (const auto& [name, value] : values) object[name] = number_or_null(value);
-  return object;
-}
-
-json json_of(const ClipStatistics& statistics) {
-  json object = {{"seconds", statistics.seconds}};
-  for (const StatisticInfo& info : clip_statistic_catalogue()) object[info.name] = statistics.*info.value;
-  return object;
-}
-
-std::vector<std::string> texts(JsonFields& fields, const std::string& key, const std::string& what) {
-  const json& list = fields.at(key);
-  std::vector<std::string> result;
-  if (!list.is_array()) throw InputError(fmt::format("{}: '{}' is no list", what, key));
-  for (const json& text : list) {
-    if (!text.is_string()) throw InputError(fmt::format("{}: '{}' holds something that is no text", what, key));
-    result.push_back(text);
-  }
-  return result;
-}
-
-std::vector<NamedDigest> digests(JsonFields& fields, const std::string& key, const std::string& what) {
-  const json& list = fields.at(key);
-  if (!list.is_array()) throw InputError(fmt::format("{}: '{}' is no list", what, key));
-  std::vector<NamedDigest> result;
-  for (const json& item : list) {
-    JsonFields file(item, fmt::format("{}: {}", what, key));
-    result.push_back({.file = file.text("file"), .sha256 = file.text("sha256")});
-    file.refuse_unknown();
-  }
-  return result;
-}
-
-std::map<std::string, std::string> text_map(JsonFields& fields, const std::string& key, const std::string& what) {
-  const json& object = fields.at(key);
-  std::map<std::string, std::string> result;
-  if (!object.is_object()) throw InputError(fmt::format("{}: '{}' is no object", what, key));
-  for (const auto& [name, text] : object.items()) {
-    if (!text.is_string()) throw InputError(fmt::format("{}: '{}.{}' is no text", what, key, name));
-    result[name] = text;
-  }
-  return result;
-}
-
-ClipStatus status_of(const std::string& text, const std::string& what) {
-  for (const ClipStatus status : kStatuses)
-    if (to_string(status) == text) return status;
-  throw InputError(fmt::format("{}: unknown status '{}'", what, text));
-}
-
-ClipStatistics statistics_of(JsonFields& fields, const std::string& what) {
-  JsonFields values(fields.at("statistics"), what + ": statistics");
-  ClipStatistics result{.seconds = values.number("seconds")};
-  for (const StatisticInfo& info : clip_statistic_catalogue())
-    result.*info.value = values.number(std::string(info.name));
-  values.refuse_unknown();
-  return result;
-}
-
-std::map<std::string, std::map<std::string, double>> metrics_of(JsonFields& fields, const std::string& what) {
-  const json& object = fields.at("metrics");
-  if (!object.is_object()) throw InputError(fmt::format("{}: 'metrics' is no object", what));
-  JsonFields robots(object, what + ": metrics");
-  std::map<std::string, std::map<std::string, double>> result;
-  for (const auto& [robot, values] : object.items()) result[robot] = robots.numbers(robot, true);
-  return result;
+std::vector<std::string> status_names() {
+  std::vector<std::string> names;
+  for (const ClipStatus status : kStatuses) names.emplace_back(to_string(status));
+  return names;
 }
 
 }  // namespace
+
+template <>
+const JsonSchema<NamedDigest>& json_schema<NamedDigest>() {
+  static const JsonSchema<NamedDigest> schema = {{{"file"}, &NamedDigest::file}, {{"sha256"}, &NamedDigest::sha256}};
+  return schema;
+}
+
+template <>
+const JsonSchema<ClipStatistics>& json_schema<ClipStatistics>() {
+  static const JsonSchema<ClipStatistics> schema = [] {
+    JsonSchema<ClipStatistics> keys = {{finite_key("seconds"), &ClipStatistics::seconds}};
+    for (const StatisticInfo& info : clip_statistic_catalogue())
+      keys.emplace_back(finite_key(std::string(info.name)), info.value);
+    return keys;
+  }();
+  return schema;
+}
+
+template <>
+const JsonSchema<DatasetEntry>& json_schema<DatasetEntry>() {
+  using E = DatasetEntry;
+  static const JsonSchema<E> schema = {
+      {{"clip"}, &E::clip},
+      {{"key"}, &E::key},
+      {{.name = "status", .choices = status_names()}, &E::status},
+      {{"gates"}, &E::gates},
+      {{"reasons"}, &E::reasons},
+      {{"format"}, &E::format},
+      {{"licence"}, &E::licence},
+      {{"label"}, &E::label},
+      {{"sources"}, &E::sources},
+      {{"evidence"}, &E::evidence},
+      {{"provenance"}, &E::provenance},
+      {{"task"}, &E::task},
+      {{"reactor"}, &E::reactor},
+      {{"frames"}, &E::frames},
+      json_group<E>({"act"}, {{finite_key("begin_s"), &E::act_begin}, {finite_key("end_s"), &E::act_end}}),
+      {{"statistics"}, &E::statistics},
+      {{"criteria"}, &E::criteria},
+      {{"outputs"}, &E::outputs},
+      {{"metrics"}, &E::metrics}};
+  return schema;
+}
 
 std::string_view to_string(ClipStatus status) {
   switch (status) {
@@ -112,57 +85,11 @@ std::string_view to_string(ClipStatus status) {
   return "";
 }
 
-std::string entry_line(const DatasetEntry& entry) {
-  json metrics = json::object();
-  for (const auto& [robot, values] : entry.metrics) metrics[robot] = json_of(values);
-  return dumped(nlohmann::json({{"clip", entry.clip},
-                                {"key", entry.key},
-                                {"status", to_string(entry.status)},
-                                {"gates", entry.gates},
-                                {"reasons", entry.reasons},
-                                {"format", entry.format},
-                                {"licence", entry.licence},
-                                {"label", entry.label},
-                                {"sources", json_of(entry.sources)},
-                                {"evidence", entry.evidence},
-                                {"provenance", entry.provenance},
-                                {"task", entry.task},
-                                {"reactor", entry.reactor},
-                                {"frames", entry.frames},
-                                {"act", {{"begin_s", entry.act_begin}, {"end_s", entry.act_end}}},
-                                {"statistics", json_of(entry.statistics)},
-                                {"criteria", json_of(entry.criteria)},
-                                {"outputs", json_of(entry.outputs)},
-                                {"metrics", metrics}}));
-}
+std::string entry_line(const DatasetEntry& entry) { return dumped(json_mapping(entry)); }
 
 DatasetEntry parse_entry(std::string_view line, const std::string& name) {
   const json parsed = parse_json(line, name);
-  JsonFields fields(parsed, name);
-  DatasetEntry entry{.clip = fields.text("clip"),
-                     .key = fields.text("key"),
-                     .status = status_of(fields.text("status"), name),
-                     .gates = texts(fields, "gates", name),
-                     .reasons = texts(fields, "reasons", name),
-                     .format = fields.text("format"),
-                     .licence = fields.text("licence"),
-                     .label = fields.text("label"),
-                     .sources = digests(fields, "sources", name),
-                     .evidence = texts(fields, "evidence", name),
-                     .provenance = text_map(fields, "provenance", name),
-                     .task = fields.text("task"),
-                     .reactor = fields.text("reactor"),
-                     .frames = static_cast<int>(std::clamp<std::int64_t>(fields.integer("frames"), 0, 1 << 30))};
-  JsonFields act(fields.at("act"), name + ": act");
-  entry.act_begin = act.number("begin_s");
-  entry.act_end = act.number("end_s");
-  act.refuse_unknown();
-  entry.statistics = statistics_of(fields, name);
-  entry.criteria = fields.numbers("criteria", true);
-  entry.outputs = digests(fields, "outputs", name);
-  entry.metrics = metrics_of(fields, name);
-  fields.refuse_unknown();
-  return entry;
+  return read_mapping<DatasetEntry>(JsonNode(parsed, name));
 }
 
 namespace {

@@ -149,23 +149,31 @@ class InputArchive {
   ArchivedSuite kept_;
 };
 
-nlohmann::json to_json(const std::vector<RunInput>& inputs) {
-  nlohmann::json files = nlohmann::json::array();
-  for (const RunInput& input : inputs)
-    files.push_back(
-        {{"of", input.of}, {"role", input.role}, {"file", input.file}, {"sha256", input.sha256}, {"kept", input.kept}});
-  return {{"schema", kInputsSchema}, {"files", files}};
+// inputs/inputs.json.
+struct InputIndex {
+  std::vector<RunInput> files;
+};
+
+}  // namespace
+
+template <>
+const JsonSchema<RunInput>& json_schema<RunInput>() {
+  using I = RunInput;
+  static const JsonSchema<I> schema = {
+      {{"of"}, &I::of}, {{"role"}, &I::role}, {{"file"}, &I::file}, {{"sha256"}, &I::sha256}, {{"kept"}, &I::kept}};
+  return schema;
 }
 
-RunInput read_input(const nlohmann::json& json, const std::string& path) {
-  JsonFields fields(json, path);
-  RunInput input{fields.text("of"), fields.text("role"), fields.text("file"), fields.text("sha256"),
-                 fields.boolean("kept")};
-  fields.refuse_unknown();
-  if (input.kept && !stays_below(input.file))
-    throw InputError(
-        fmt::format("{}: key 'file': expected a path below the run directory, found '{}'", path, input.file));
-  return input;
+template <>
+const JsonSchema<InputIndex>& json_schema<InputIndex>() {
+  static const JsonSchema<InputIndex> schema = {{{"files"}, &InputIndex::files}};
+  return schema;
+}
+
+namespace {
+
+std::string index_text(const std::vector<RunInput>& inputs) {
+  return dumped(json_document(kInputsSchema, InputIndex{inputs}), 2) + "\n";
 }
 
 void check_kept(const RunInput& input, const std::string& folder) {
@@ -320,15 +328,11 @@ void rebase_actor(Actor& actor, const std::function<void(std::string&)>& rebase)
 
 std::vector<RunInput> read_inputs(const std::string& folder) {
   const std::string path = in(folder, kIndex);
-  const nlohmann::json json = parse_json(read_file(path), path);
-  JsonFields fields(json, path);
-  if (const std::string schema = fields.text("schema"); schema != kInputsSchema)
-    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kInputsSchema, schema));
-  const nlohmann::json& files = fields.at("files");
-  fields.refuse_unknown();
-  if (!files.is_array()) throw InputError(fmt::format("{}: key 'files': expected a list", path));
-  std::vector<RunInput> inputs;
-  for (const nlohmann::json& file : files) inputs.push_back(read_input(file, path));
+  std::vector<RunInput> inputs = read_document<InputIndex>(read_file(path), path, kInputsSchema).files;
+  for (const RunInput& input : inputs)
+    if (input.kept && !stays_below(input.file))
+      throw InputError(fmt::format("{}: key 'file': expected a path below the run directory, found '{}'", path,
+                                   excerpt(input.file)));
   return inputs;
 }
 
@@ -363,7 +367,7 @@ void keep_inputs(const ArchivedSuite& kept, const std::string& folder) {
     fs::permissions(to, fs::status(copy.from).permissions() | fs::perms::owner_write);
   }
   if (const std::string index = join_without_links(folder, kIndex); !fs::exists(index))
-    write_file(index, dumped(to_json(kept.inputs), 2) + "\n");
+    write_file(index, index_text(kept.inputs));
 }
 
 bool has_inputs(const std::string& folder) { return fs::exists(in(folder, kIndex)); }
@@ -410,7 +414,7 @@ PublishedInputs published_inputs(const std::string& run, bool without_clips) {
     check_kept(input, run);
     published.files.insert(fs::path(input.file).lexically_normal().generic_string());
   }
-  published.texts[kIndex] = dumped(to_json(inputs), 2) + "\n";
+  published.texts[kIndex] = index_text(inputs);
   return published;
 }
 

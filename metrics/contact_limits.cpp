@@ -21,18 +21,16 @@ void read_transient(const YamlSection& section, RegionLimits& limits) {
   if (!section.has(kKey)) return;
   const YAML::Node node = section.node(kKey);
   if (node.IsScalar() && node.Scalar() == "not_allowed") {
-    if (!limits.quasi_static_n)
-      section.fail(section.line(kKey), "'transient_n': 'not_allowed' needs 'quasi_static_n', found none");
+    if (!limits.quasi_static_n) section.fail_key(kKey, "'not_allowed' needs 'quasi_static_n', found none");
     limits.transient_allowed = false;
     return;
   }
   double value = 0.0;
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value) || value <= 0.0)
-    section.fail(section.line(kKey),
-                 fmt::format("'{}': expected a number > 0 or 'not_allowed', found {}", kKey, describe(node)));
+    section.refuse_key(kKey, "a number > 0 or 'not_allowed'", node);
   if (limits.quasi_static_n && value < *limits.quasi_static_n)
-    section.fail(section.line(kKey), fmt::format("'{}': expected at least 'quasi_static_n' = {}, found {}", kKey,
-                                                 *limits.quasi_static_n, value));
+    section.fail_key(kKey,
+                     fmt::format("expected at least 'quasi_static_n' = {}, found {}", *limits.quasi_static_n, value));
   limits.transient_n = value;
 }
 
@@ -51,9 +49,7 @@ const Schema<RegionLimits>& region_schema() {
 std::string read_verified_by(const YamlSection& top) {
   const YAML::Node node = top.node("verified_by");
   if (node.IsNull()) return "";
-  if (!node.IsScalar())
-    top.fail(top.line("verified_by"),
-             fmt::format("'verified_by': expected a name or nothing, found {}", describe(node)));
+  if (!node.IsScalar()) top.refuse_key("verified_by", "a name or nothing", node);
   const std::string& name = node.Scalar();
   return name.find_first_not_of(" \t\n") == std::string::npos ? "" : name;
 }
@@ -80,8 +76,7 @@ const RegionLimits& ContactLimits::region(std::string_view wanted) const {
 ContactLimits parse_contact_limits(const std::string& text, const std::string& file) {
   const YamlSection top(file, parse_yaml(text, file), "contact limits",
                         {"schema", "name", "source", "verified_by", "regions"});
-  if (const std::string schema = top.text("schema"); schema != kSchema)
-    top.fail(top.line("schema"), fmt::format("'schema': expected '{}', found '{}'", kSchema, schema));
+  top.require_schema(kSchema);
   ContactLimits limits{
       .name = top.text("name"), .source = top.text("source"), .verified_by = read_verified_by(top), .regions = {}};
   (void)top.node("regions");

@@ -83,7 +83,7 @@ CardShape read_shape(const std::string& file, const YAML::Node& node) {
   shape.link = section.text("link");
   const std::string kind = section.text("kind");
   if (kind != "sphere" && kind != "capsule")
-    section.fail(section.line("kind"), fmt::format("'kind': expected sphere or capsule, found '{}'", kind));
+    section.fail_key("kind", fmt::format("expected sphere or capsule, found '{}'", kind));
   shape.kind = kind == "sphere" ? ShapeKind::kSphere : ShapeKind::kCapsule;
   const bool sphere = shape.kind == ShapeKind::kSphere;
   for (const char* key : {"center", "from", "to"})
@@ -97,7 +97,7 @@ CardShape read_shape(const std::string& file, const YAML::Node& node) {
     section.fail(shape.place.line, "expected two different ends of the capsule, found the same point");
   read_value(section, {.name = "radius", .range = kPositive}, shape.radius);
   shape.region = section.text("region");
-  shape.sole = section.flag_or("sole", false);
+  read_optional(section, {"sole"}, shape.sole);
   return shape;
 }
 
@@ -117,7 +117,7 @@ CardPoint read_human_point(const std::string& file, const YAML::Node& node, cons
 CardRegions read_regions(const YamlSection& root, const std::string& file, const YAML::Node& node) {
   const int line = node.Mark().line + 1;
   if (!node.IsSequence() || node.size() != 2 || !node[0].IsScalar() || !node[1].IsScalar())
-    root.fail(line, fmt::format("'self_collision': expected a pair of regions, found {}", describe(node)));
+    root.fail(line, fmt::format("key 'self_collision': expected a pair of regions, found {}", describe(node)));
   return {.place = {file, line}, .first = node[0].Scalar(), .second = node[1].Scalar()};
 }
 
@@ -163,13 +163,15 @@ class CardReader {
     const std::string base = root.text("extends");
     const int line = root.line("extends");
     if (fs::path(base).is_absolute() || !base.ends_with(".yaml"))
-      root.fail(line, fmt::format("'extends': expected the path of a card (.yaml) from this one, found '{}'", base));
+      root.fail(line,
+                fmt::format("key 'extends': expected the path of a card (.yaml) from this one, found '{}'", base));
     const std::string path = (fs::path(file).parent_path() / base).lexically_normal().string();
     chain_.push_back(fs::path(file).lexically_normal().string());
     if (std::ranges::find(chain_, path) != chain_.end())
-      root.fail(line, fmt::format("'extends': expected cards without a cycle, found {}, which extends {}", path, file));
+      root.fail(line,
+                fmt::format("key 'extends': expected cards without a cycle, found {}, which extends {}", path, file));
     if (chain_.size() > kMostExtended)
-      root.fail(line, fmt::format("'extends': expected at most {} cards in a row, found one more", kMostExtended));
+      root.fail(line, fmt::format("key 'extends': expected at most {} cards in a row, found one more", kMostExtended));
     RobotCard card = read(read_text(path), path);
     card.urdf = (fs::path(base).parent_path() / card.urdf).lexically_normal().string();
     return card;

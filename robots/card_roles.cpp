@@ -23,9 +23,7 @@ constexpr const char* kSides[] = {"left", "right"};
 
 std::vector<CardName> names_in(const YamlSection& section, const std::string& file, const char* key,
                                const YAML::Node& list) {
-  const auto fail = [&](const YAML::Node& node) {
-    section.fail(section.line(key), fmt::format("'{}': expected a list of names, found {}", key, describe(node)));
-  };
+  const auto fail = [&](const YAML::Node& node) { section.refuse_key(key, "a list of names", node); };
   if (!list.IsSequence()) fail(list);
   std::vector<CardName> names;
   for (const YAML::Node& node : list) {
@@ -48,8 +46,7 @@ void read_names(const YamlSection& card, const std::string& file, const char* ke
 }
 
 void refuse_many(const YamlSection& card, const char* key, std::size_t count) {
-  if (count > kMostGroups)
-    card.fail(card.line(key), fmt::format("'{}': expected at most {}, found {}", key, kMostGroups, count));
+  if (count > kMostGroups) card.fail_key(key, fmt::format("expected at most {}, found {}", kMostGroups, count));
 }
 
 void read_compound(const YamlSection& card, const std::string& file, std::vector<std::vector<CardName>>& groups) {
@@ -68,15 +65,15 @@ std::pair<double, double> range(const YamlSection& section, const std::string& k
     double value = 0.0;
     if (!node[i].IsScalar() || !YAML::convert<double>::decode(node[i], value) || !std::isfinite(value))
       section.fail(node.Mark().line + 1,
-                   fmt::format("'{}': expected a finite number, found {}", key, describe(node[i])));
+                   fmt::format("key '{}': expected a finite number, found {}", key, describe(node[i])));
     return value;
   };
   if (!node.IsSequence() || node.size() != 2)
-    section.fail(node.Mark().line + 1, fmt::format("'{}': expected two numbers, found {}", key, describe(node)));
+    section.fail(node.Mark().line + 1, fmt::format("key '{}': expected two numbers, found {}", key, describe(node)));
   const std::pair<double, double> values = {number(0), number(1)};
   if (values.first > values.second)
     section.fail(node.Mark().line + 1,
-                 fmt::format("'{}': expected lower <= upper, found [{}, {}]", key, values.first, values.second));
+                 fmt::format("key '{}': expected lower <= upper, found [{}, {}]", key, values.first, values.second));
   return values;
 }
 
@@ -107,12 +104,13 @@ template <typename Take>
 void for_each_joint(const YamlSection& card, const std::string& file, const std::string& where, const YAML::Node& node,
                     Take take) {
   if (!node.IsMap())
-    card.fail(node.Mark().line + 1, fmt::format("'{}': expected a mapping, found {}", where, describe(node)));
+    card.fail(node.Mark().line + 1, fmt::format("key '{}': expected a mapping, found {}", where, describe(node)));
   std::set<std::string> seen;
   for (const auto& entry : node) {
     const CardName joint{entry.first.IsScalar() ? entry.first.Scalar() : "", {file, entry.first.Mark().line + 1}};
     if (!seen.insert(joint.name).second)
-      card.fail(joint.place.line, fmt::format("'{}': expected each joint once, found '{}' again", where, joint.name));
+      card.fail(joint.place.line,
+                fmt::format("key '{}': expected each joint once, found '{}' again", where, joint.name));
     take(joint, entry.second);
   }
 }
@@ -138,7 +136,7 @@ void read_poses(const YamlSection& card, const std::string& file,
       double angle = 0.0;
       if (!value.IsScalar() || !YAML::convert<double>::decode(value, angle) || !std::isfinite(angle))
         card.fail(joint.place.line,
-                  fmt::format("'{}': expected a finite number, found {}", joint.name, describe(value)));
+                  fmt::format("key '{}': expected a finite number, found {}", joint.name, describe(value)));
       out.push_back({joint, angle});
     });
   });
@@ -227,16 +225,16 @@ class RoleBinder {
 
   void exchange(const std::array<std::vector<int>, 2>& sides, const CardPlace& place, const char* what) {
     if (sides[0].size() != sides[1].size())
-      fail_at(place, fmt::format("'{}': expected as many joints left as right, found {} and {}", what, sides[0].size(),
-                                 sides[1].size()));
+      fail_at(place, fmt::format("key '{}': expected as many joints left as right, found {} and {}", what,
+                                 sides[0].size(), sides[1].size()));
     for (std::size_t i = 0; i < sides[0].size(); ++i) {
       const int left = sides[0][i], right = sides[1][i];
       if (roles_.counterpart[left] != left || roles_.counterpart[right] != right || left == right)
-        fail_at(place, fmt::format("'{}': expected each joint once in legs and arms, found '{}' or '{}' again", what,
-                                   robot_.joints[left].name, robot_.joints[right].name));
+        fail_at(place, fmt::format("key '{}': expected each joint once in legs and arms, found '{}' or '{}' again",
+                                   what, robot_.joints[left].name, robot_.joints[right].name));
       if (std::abs(mirrored_axis(hinge_axis(robot_, left)).dot(hinge_axis(robot_, right))) < kParallel)
-        fail_at(place, fmt::format("'{}': expected '{}' to mirror '{}', found hinges about other axes at zero", what,
-                                   robot_.joints[left].name, robot_.joints[right].name));
+        fail_at(place, fmt::format("key '{}': expected '{}' to mirror '{}', found hinges about other axes at zero",
+                                   what, robot_.joints[left].name, robot_.joints[right].name));
       roles_.counterpart[left] = right;
       roles_.counterpart[right] = left;
     }

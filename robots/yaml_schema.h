@@ -47,27 +47,23 @@ inline constexpr FieldRange kPositive = {.low = 0.0, .with_low = false};
 
 // The value of a key that is there: finite numbers in the words' range, whole numbers, flags and enumerations of the
 // words' choices, texts that are not empty, lists of these, where one number alone is a list of one. Throw InputError:
-// file, line, the mapping, "'key': expected ..., found ...".
-void read_value(const YamlSection& section, const FieldDoc& words, double& out);
-void read_value(const YamlSection& section, const FieldDoc& words, int& out);
-void read_value(const YamlSection& section, const FieldDoc& words, bool& out);
-void read_value(const YamlSection& section, const FieldDoc& words, std::string& out);
+// file, line, the mapping, "key 'KEY': expected ..., found ...".
 void read_value(const YamlSection& section, const FieldDoc& words, Eigen::Vector3d& out);
 void read_value(const YamlSection& section, const FieldDoc& words, std::vector<double>& out);
 void read_value(const YamlSection& section, const FieldDoc& words, std::vector<std::string>& out);
-std::size_t read_choice(const YamlSection& section, const FieldDoc& words);
+// The text of a key that is there; refuses a list, a mapping, nothing and "" with what was expected.
+std::string scalar_text(const YamlSection& section, const FieldDoc& words, const std::string& expected);
 
 template <typename T>
-requires std::is_enum_v<T>
 void read_value(const YamlSection& section, const FieldDoc& words, T& out) {
-  out = static_cast<T>(read_choice(section, words));
-}
-template <typename T>
-void read_value(const YamlSection& section, const FieldDoc& words, std::optional<T>& out) {
-  read_value(section, words, out.emplace());
+  FieldDoc said = words;
+  if (std::is_same_v<T, bool> && said.choices.empty()) said.choices = flag_words();
+  const std::string text = scalar_text(section, said, field_values<T>(said, said.range));
+  if (const std::string expected = assign_field(said, text, said.range, out); !expected.empty())
+    section.fail(section.line(said.name.c_str()), field_refusal(said, expected, text));
 }
 
-// Whole numbers of a list; "'axes': expected a whole number in [0, 2], found 3".
+// Whole numbers of a list; "key 'axes': expected a whole number, 0 to 2, found 3".
 std::vector<int> whole_numbers(const YamlSection& section, const FieldDoc& words);
 
 // A key that has to be there.
@@ -88,11 +84,12 @@ SchemaKey<Owner> optional_key(const FieldDoc& words, T Owner::*member) {
   return {words.name, [=](const YamlSection& section, Owner& owner) { read_optional(section, words, owner.*member); }};
 }
 
-template <typename Owner>
-std::vector<const char*> schema_keys(const Schema<Owner>& schema) {
+// The keys of a schema, or of a table of fields.
+template <typename Table>
+std::vector<const char*> key_names(const Table& table) {
   std::vector<const char*> names;
-  names.reserve(schema.size());
-  for (const SchemaKey<Owner>& key : schema) names.push_back(key.name.c_str());
+  names.reserve(table.size());
+  for (const auto& key : table) names.push_back(key.name.c_str());
   return names;
 }
 
@@ -102,7 +99,7 @@ std::vector<const char*> schema_keys(const Schema<Owner>& schema) {
 template <typename Owner>
 SchemaSection read_mapping(const std::string& file, const YAML::Node& node, std::string where,
                            const Schema<Owner>& schema, Owner& owner) {
-  SchemaSection section(file, node, std::move(where), schema_keys(schema));
+  SchemaSection section(file, node, std::move(where), key_names(schema));
   if constexpr (requires { owner.line; }) owner.line = section.line();
   for (const SchemaKey<Owner>& key : schema)
     if (key.read) key.read(section, owner);
@@ -128,6 +125,29 @@ SchemaKey<Owner> mapping_key(const std::string& name, Member Owner::*member, con
           }};
 }
 
+// Sets the field where the section has its key. Throws InputError.
+template <typename Owner>
+void read_field(const YamlSection& section, const Field<Owner>& known, Owner& owner) {
+  const char* key = known.name.c_str();
+  if (!section.has(key)) return raise_default(known, owner);
+  const std::string text = scalar_text(section, known, known.values);
+  if (const std::string expected = set_field(known, owner, text); !expected.empty())
+    section.fail(section.line(key), field_refusal(known, expected, text));
+}
+
+// All of them, in the order of the table.
+template <typename Owner>
+void read_fields(const YamlSection& section, const FieldTable<Owner>& table, Owner& owner) {
+  for (const Field<Owner>& known : table) read_field(section, known, owner);
+}
+
+// Reads a mapping of nothing but fields.
+template <typename Owner>
+void read_fields(const std::string& file, const YAML::Node& node, const std::string& where,
+                 const FieldTable<Owner>& table, Owner& owner) {
+  read_fields(YamlSection(file, node, where, key_names(table)), table, owner);
+}
+
 // The key that a field names (core/field.h): read by it, written as its text, described by its row.
 template <typename Owner>
 SchemaKey<Owner> field_key(const Field<Owner>& value) {
@@ -141,7 +161,7 @@ SchemaKey<Owner> group_key(const std::string& name, const FieldTable<Owner>& tab
   SchemaKey<Owner> key(name);
   key.read = [name, table](const SchemaSection& section, Owner& owner) {
     const YAML::Node node = section.has(name.c_str()) ? section.node(name.c_str()) : YAML::Node(YAML::NodeType::Map);
-    read_fields(YamlSection(section.file, node, name, field_keys(table)), table, owner);
+    read_fields(section.file, node, name, table, owner);
   };
   key.rows = field_rows(table, Owner());
   for (FieldRow& row : key.rows) row.name = name + '.' + row.name;

@@ -91,6 +91,19 @@ void YamlSection::fail(int line, const std::string& message) const {
   throw InputError(fmt::format("{}:{}: {}: {}", file_, line, excerpt(where_), excerpt(message, kShownSentence)));
 }
 
+void YamlSection::fail_key(const char* key, const std::string& message) const {
+  fail(line(key), fmt::format("key '{}': {}", key, message));
+}
+
+void YamlSection::refuse_key(const char* key, std::string_view expected, const YAML::Node& found) const {
+  fail_key(key, fmt::format("expected {}, found {}", expected, describe(found)));
+}
+
+void YamlSection::require_schema(std::string_view schema) const {
+  if (const std::string found = text("schema"); found != schema)
+    fail(line("schema"), fmt::format("expected schema {}, found {}", schema, excerpt(found)));
+}
+
 YAML::Node YamlSection::node(const char* key) const {
   YAML::Node value = node_[key];
   if (!value) fail(line(), fmt::format("expected the key '{}', found none", key));
@@ -99,63 +112,30 @@ YAML::Node YamlSection::node(const char* key) const {
 
 std::string YamlSection::text(const char* key) const {
   const YAML::Node value = node(key);
-  if (!value.IsScalar() || value.Scalar().empty())
-    fail(line(key), fmt::format("'{}': expected a text, found {}", key, describe(value)));
+  if (!value.IsScalar() || value.Scalar().empty()) refuse_key(key, "a text", value);
   return value.Scalar();
 }
 
 double YamlSection::finite(const YAML::Node& node, const char* key) const {
   double value = 0.0;
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value))
-    fail(line(key), fmt::format("'{}': expected a finite number, found {}", key, describe(node)));
+    refuse_key(key, "a finite number", node);
   return value;
 }
 
 double YamlSection::number(const char* key) const { return finite(node(key), key); }
 
-std::optional<double> YamlSection::optional_number(const char* key) const {
-  if (!has(key)) return std::nullopt;
-  return number(key);
-}
-
-bool YamlSection::flag_or(const char* key, bool fallback) const {
-  if (!has(key)) return fallback;
-  const YAML::Node value = node(key);
-  bool flag = false;
-  if (!value.IsScalar() || !YAML::convert<bool>::decode(value, flag))
-    fail(line(key), fmt::format("'{}': expected true or false, found {}", key, describe(value)));
-  return flag;
-}
-
 Eigen::Vector3d YamlSection::vector3(const char* key) const {
   const YAML::Node value = node(key);
-  if (!value.IsSequence() || value.size() != 3)
-    fail(line(key), fmt::format("'{}': expected three numbers, found {}", key, describe(value)));
+  if (!value.IsSequence() || value.size() != 3) refuse_key(key, "three numbers", value);
   return {finite(value[0], key), finite(value[1], key), finite(value[2], key)};
 }
 
 std::vector<YAML::Node> YamlSection::items(const char* key) const {
   if (!has(key)) return {};
   const YAML::Node value = node(key);
-  if (!value.IsSequence()) fail(line(key), fmt::format("'{}': expected a list, found {}", key, describe(value)));
+  if (!value.IsSequence()) refuse_key(key, "a list", value);
   return {value.begin(), value.end()};
-}
-
-std::string field_node_text(const YamlSection& section, const FieldDoc& words, const std::string& values) {
-  const YAML::Node node = section.node(words.name.c_str());
-  if (!node.IsScalar() || node.Scalar().empty())
-    section.fail(section.line(words.name.c_str()),
-                 fmt::format("{}: expected {}, found {}", words.name, values, describe(node)));
-  return node.Scalar();
-}
-
-double in_range(const YamlSection& section, const char* key, double fallback, const Range& range) {
-  const double value = section.optional_number(key).value_or(fallback);
-  if (value > range.high || value < range.low || (value == range.low && !range.with_low))
-    section.fail(section.has(key) ? section.line(key) : section.line(),
-                 fmt::format("{}: expected a number {} {:g}, at most {:g}, found {:g}", key,
-                             range.with_low ? "from" : "above", range.low, range.high, value));
-  return value;
 }
 
 namespace {
@@ -180,14 +160,14 @@ std::string tag_fault(std::string_view of, const std::string& name, const YAML::
 Tags read_tags(const YamlSection& item, std::string_view of) {
   if (!item.has(kTagsKey)) return {};
   const YAML::Node node = item.node(kTagsKey);
-  if (!node.IsMap()) item.fail(item.line(kTagsKey), fmt::format("tags: expected a mapping, found {}", describe(node)));
+  if (!node.IsMap()) item.refuse_key(kTagsKey, "a mapping", node);
   Tags tags;
   for (const auto& entry : node) {
     const std::string name = entry.first.IsScalar() ? entry.first.Scalar() : "";
     std::string fault = tag_fault(of, name, entry.second);
     if (fault.empty() && !tags.emplace(name, entry.second.Scalar()).second)
       fault = fmt::format("expected each name once, found '{}' twice", name);
-    if (!fault.empty()) item.fail(std::max(entry.first.Mark().line, 0) + 1, fmt::format("tags: {}", fault));
+    if (!fault.empty()) item.fail(std::max(entry.first.Mark().line, 0) + 1, fmt::format("key 'tags': {}", fault));
   }
   return tags;
 }

@@ -7,12 +7,10 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <map>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "duet/core/field.h"
 #include "duet/core/task.h"
 
 namespace duet {
@@ -30,8 +28,6 @@ class YamlSection {
   // A missing key throws, naming it.
   [[nodiscard]] std::string text(const char* key) const;
   [[nodiscard]] double number(const char* key) const;
-  [[nodiscard]] std::optional<double> optional_number(const char* key) const;
-  [[nodiscard]] bool flag_or(const char* key, bool fallback) const;
   [[nodiscard]] Eigen::Vector3d vector3(const char* key) const;
   // Elements of a list; none where the key is absent.
   [[nodiscard]] std::vector<YAML::Node> items(const char* key) const;
@@ -41,8 +37,13 @@ class YamlSection {
   // The mapping itself.
   [[nodiscard]] const YAML::Node& keys() const { return node_; }
 
-  // Throws InputError("FILE:LINE: WHERE: MESSAGE").
+  // Throw InputError("FILE:LINE: WHERE: MESSAGE"), of a key "FILE:LINE: WHERE: key 'KEY': MESSAGE", where a value is
+  // refused "expected WHAT, found VALUE".
   [[noreturn]] void fail(int line, const std::string& message) const;
+  [[noreturn]] void fail_key(const char* key, const std::string& message) const;
+  [[noreturn]] void refuse_key(const char* key, std::string_view expected, const YAML::Node& found) const;
+  // Throws where the key `schema` is another.
+  void require_schema(std::string_view schema) const;
 
  private:
   // Counted from 1; an empty document has no mark.
@@ -61,45 +62,6 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file);
 
 // The content of a node, for the "found" part of a message: "'text'", "a list", "a mapping", "nothing".
 std::string describe(const YAML::Node& node);
-
-// Tables of fields (core/field.h) read from YAML: strictly, with file, line, key, what was expected and what was found.
-
-// The value of a key that is there, as text. Throws InputError for a list, a mapping, nothing and "".
-std::string field_node_text(const YamlSection& section, const FieldDoc& words, const std::string& values);
-
-template <typename Owner>
-std::vector<const char*> field_keys(const FieldTable<Owner>& table) {
-  std::vector<const char*> keys;
-  keys.reserve(table.size());
-  for (const Field<Owner>& known : table) keys.push_back(known.name.c_str());
-  return keys;
-}
-
-// Sets the field where the section has its key. Throws InputError.
-template <typename Owner>
-void read_field(const YamlSection& section, const Field<Owner>& known, Owner& owner) {
-  const char* key = known.name.c_str();
-  if (!section.has(key)) return raise_default(known, owner);
-  const std::string text = field_node_text(section, known, known.values);
-  if (const std::string expected = set_field(known, owner, text); !expected.empty())
-    section.fail(section.line(key), field_refusal(known, expected, text));
-}
-
-// All of them, in the order of the table.
-template <typename Owner>
-void read_fields(const YamlSection& section, const FieldTable<Owner>& table, Owner& owner) {
-  for (const Field<Owner>& known : table) read_field(section, known, owner);
-}
-
-// Numbers of a YAML mapping inside their range.
-
-struct Range {
-  double low, high;
-  bool with_low;  // whether `low` itself is allowed
-};
-
-// The number under `key`, or `fallback`. Throws InputError (file, line, key, expected, found) outside the range.
-double in_range(const YamlSection& section, const char* key, double fallback, const Range& range);
 
 // The mapping `tags` of an item of a suite (core/task.h).
 

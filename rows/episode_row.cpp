@@ -14,6 +14,103 @@
 #include "duet/rows/json_fields.h"
 
 namespace duet {
+template <>
+const JsonSchema<Verdict>& json_schema<Verdict>() {
+  using P = Verdict;
+  static const JsonSchema<P> schema = {
+      {{"version", "`paper` (as printed), `robot` (the performer's tracks are the robot's), `interaction` (the rule)"},
+       &P::version},
+      {{"thresholds", "`paper`, `strict`, `act`"}, &P::thresholds},
+      {{"success", "whether the detector saw the act"}, &P::success},
+      {{"parts", "conditions that hold or not"}, &P::parts},
+      {{"values", "what the conditions are of; `duet list detectors` has names and units"}, &P::values},
+      {{"margins", "of each condition; a positive one is satisfied"}, &P::margins},
+      {{"frames", "number of evidence frames"}, &P::frames},
+  };
+  return schema;
+}
+
+template <>
+const JsonSchema<StateTrace>& json_schema<StateTrace>() {
+  using P = StateTrace;
+  static const JsonSchema<P> schema = {
+      {{.name = "rate_hz",
+        .meaning = "frames a second; frame i is at i / rate_hz",
+        .unit = "Hz",
+        .range = {.low = 0.0, .with_low = false}},
+       &P::rate_hz},
+      {{"points", "`root`, `left_hand`, `right_hand`"}, &P::points},
+      {{"mm", "one list per frame: x, y, z of each point in turn, frame W", "mm"}, &P::mm},
+  };
+  return schema;
+}
+
+template <>
+const JsonSchema<ControllerFaults>& json_schema<ControllerFaults>() {
+  using P = ControllerFaults;
+  static const JsonSchema<P> schema = {
+      {{"observations", "ticks on which the state or the reference was not finite"}, &P::observations},
+      {{"actions", "ticks on which the command was not finite"}, &P::actions},
+      {{"stopped", "whether it ended in its safe stop"}, &P::stopped},
+  };
+  return schema;
+}
+
+template <>
+const JsonSchema<PolicyFaults>& json_schema<PolicyFaults>() {
+  using P = PolicyFaults;
+  static const JsonSchema<P> schema = {
+      {{"late", "plans that did not come in time"}, &P::late},
+      {{"invalid", "plans that could not be used: not finite, of the wrong size, not unit"}, &P::invalid},
+      {{"dead", "whether it gave no plan any more; the outcome is then `error`"}, &P::dead},
+      {{"message", "of the first fault"}, &P::message},
+  };
+  return schema;
+}
+
+template <>
+const JsonSchema<PlanTimes>& json_schema<PlanTimes>() {
+  using P = PlanTimes;
+  static const JsonSchema<P> schema = {
+      {{"p50", "median; null where no plan was asked for", "ms"}, &P::p50},
+      {{"p95", "95th percentile", "ms"}, &P::p95},
+      {{"max", "longest", "ms"}, &P::max},
+  };
+  return schema;
+}
+
+template <>
+const JsonSchema<FootTrace>& json_schema<FootTrace>() {
+  using P = FootTrace;
+  static const JsonSchema<P> schema = {
+      {{.name = "rate_hz",
+        .meaning = "frames a second; frame i is at i / rate_hz",
+        .unit = "Hz",
+        .range = {.low = 0.0, .with_low = false}},
+       &P::rate_hz},
+      {{"left_mm", "height of the left sole's lowest point over the ground, one per frame", "mm"}, &P::left_mm},
+      {{"right_mm", "likewise of the right sole", "mm"}, &P::right_mm},
+  };
+  return schema;
+}
+
+template <>
+const JsonSchema<RowContact>& json_schema<RowContact>() {
+  using P = RowContact;
+  static const JsonSchema<P> schema = {
+      {{"link", "name of the robot's link"}, &P::link},
+      {{"region", "body region of the human"}, &P::region},
+      {{"capsule", "name of the human's capsule"}, &P::capsule},
+      {{"begin_s", "from the episode's begin", "s"}, &P::begin_s},
+      {{"duration_s", "how long it lasted", "s"}, &P::duration_s},
+      {{"peak_n", "largest force", "N"}, &P::peak_n},
+      {{"impulse_ns", "of the force's magnitude", "N s"}, &P::impulse_ns},
+      {{"depth_m", "largest depth", "m"}, &P::depth_m},
+      {{"windowed_mean_n", "largest mean force over 0.1 s", "N"}, &P::windowed_mean_n},
+  };
+  return schema;
+}
+
 namespace {
 
 void check_key(const EpisodeRow& row) {
@@ -29,186 +126,29 @@ void check_arm(const EpisodeRow& row) {
 
 using Row = EpisodeRow;
 
-constexpr auto kRowFields = std::to_array<RowField>({
-    {{"key", &Row::key,
-      "SHA-256 over suite hash, detectors, task, clip, episode, arm, policy, policy digest, controller, controller "
-      "digest, engine, perturbation, each as `<length>:<text>`; once per run; checked on reading"},
-     {.scanned = true, .check = check_key}},
-    {{"suite", &Row::suite, "name of the suite"}, {.scanned = true}},
-    {{"suite_version", &Row::suite_version, "rows compare only within one name and version"}, {.scanned = true}},
-    {{"suite_hash", &Row::suite_hash, "SHA-256 of the resolved suite"}, {.scanned = true, .tabled = false}},
-    {{"task", &Row::task, "a name of `duet list tasks`"}, {.scanned = true}},
-    {{"clip", &Row::clip, "id of the clip"}, {.scanned = true}},
-    {{"episode", &Row::episode, "number from 0"}, {.scanned = true}},
-    {{"seed", &Row::seed, "what all randomness of the episode comes from"}},
-    {{"engine", &Row::engine, "a name of `duet list engines`"}, {.scanned = true}},
-    {{"engine_version", &Row::engine_version, "as the engine says it"}},
-    {{"engine_profile", &Row::engine_profile, "`parity`, `fast`, ..."}, {.scanned = true}},
-    {{"profile_digest", &Row::profile_digest,
-      "SHA-256 of the engine's resolved profile. Not part of `key`: the suite hash covers what the profile says"},
-     {.scanned = true, .tabled = false}},
-    {{"controller", &Row::controller, "as the suite names it"}, {.scanned = true}},
-    {{"controller_digest", &Row::controller_digest, "SHA-256 of what it is; empty where its files were not there"},
-     {.scanned = true, .tabled = false}},
-    {{"policy", &Row::policy, "as the suite names it"}, {.scanned = true}},
-    {{"policy_digest", &Row::policy_digest, "SHA-256 of what it is; empty where its files were not there"},
-     {.scanned = true, .tabled = false}},
-    {{"perturbation", &Row::perturbation, "`clean` or the name of one in the suite"}, {.scanned = true}},
-    {{"robot_digest", &Row::robot_digest,
-      "SHA-256 of the robot model, the controller's own body; empty where the controller is absent"},
-     {.scanned = true, .tabled = false}},
-    {{"arm", &Row::arm,
-      "`main`, `null` (a robot that stands still), `control` (a scripted policy that no score may reward), `shuffled` "
-      "(a policy that sees the partner of another clip)"},
-     {.scanned = true, .check = check_arm}},
-    {{"outcome", &Row::outcome, "`ok`, `fell`, `diverged`, `timeout`, `unsupported`, `error`"}, {.scanned = true}},
-    {{"message", &Row::message, "why, where the outcome is not `ok`; else empty"}},
-    {{.name = "tags",
-      .member = &Row::tags,
-      .meaning = "what the suite says of the episode beside names, by name; absent where it says nothing "
-                 "([Tags](../file-formats.md#tags))",
-      .optional = true},
-     {}},
-    {{"detectors", &Row::detectors, "version of the detectors' code"}, {.scanned = true}},
-    {{"success", &Row::success,
-      "headline verdict; `null`: no detector ruled. Counted as success only where the outcome is `ok`"}},
-    {{"verdicts", &Row::verdicts, "of every detector"}},
-    {{"metrics", &Row::metrics,
-      "names, units and directions: `duet list metrics`. `onset_s`: the first time from 1 s on at which a hand of the "
-      "robot, in the pelvis frame, is 0.12 m from its median place over the first second, as a mean over the next 0.2 "
-      "s, and stays there for 0.6 s (arms that swing with the steps do not); `partner_onset_s`: the same of the "
-      "partner's wrists in the frame of its root",
-      "", true}},
-    {{"fell", &Row::fell, "at any time in the episode"}},
-    {{"frames", &Row::frames, "recorded frames"}},
-    {{"sim_s", &Row::sim_s, "simulated time", "s"}},
-    {{"wall_s", &Row::wall_s, "real time", "s"}, {.repeats = false}},
-    {{"contact_peak_n", &Row::contact_peak_n, "largest force of the human on the robot", "N"}},
-    {{"contact_impulse_ns", &Row::contact_impulse_ns, "impulse of the human on the robot", "N s"}},
-    {{"forces", &Row::forces,
-      "contact forces by dotted name: `ground.mean_n`, `human.peak_n`, `human.chest.peak_n`, ... The ending is the "
-      "unit: `_n` [N], `_ns` [N s], `_s` [s], `_n_cm2` [N/cm^2]; any other: a ratio or a flag",
-      "", true}},
-    {{"contacts", &Row::contacts,
-      "contacts of one robot link with one capsule of a solid human, the 16 with the largest peak force, by begin"},
-     {.tabled = false}},
-    {{"contacts_total", &Row::contacts_total, "number of such contacts, those left out included"}},
-    {{"trace", &Row::trace, "where a few points were"}, {.heavy = true, .tabled = false}},
-    {{"feet", &Row::feet, "of a controller that walks, in an engine, the main arm: height of its soles"},
-     {.heavy = true, .tabled = false}},
-    {{"late_plans", &Row::late_plans, "ticks without a plan in time"}},
-    {{"faults", &Row::faults, "of the controller"}},
-    {{"policy_faults", &Row::policy_faults,
-      "of the policy. A plan that fails is left out and the last one held; an episode whose policy is dead has the "
-      "outcome `error`"},
-     {.columns = "policy"}},
-    {{"policy_ms", &Row::policy_ms, "wall time of a plan"}, {.repeats = false}},
-    {{"state_hash", &Row::state_hash, "SHA-256 over the state trajectory; equal on the same program and machine"},
-     {.scanned = true}},
-    {{"started_at", &Row::started_at, "UTC, ISO 8601"}, {.scanned = true, .repeats = false, .tabled = false}},
-});
-
-void check_schema(JsonFields& fields) {
-  const std::int64_t schema = fields.integer("schema");
-  if (schema != kRowSchema)
-    throw InputError(fmt::format("episode row: expected schema {}, found {}", kRowSchema, schema));
+std::vector<std::string> outcome_names() {
+  std::vector<std::string> names;
+  for (int i = 0; i <= static_cast<int>(Outcome::kError); ++i) names.emplace_back(to_string(static_cast<Outcome>(i)));
+  return names;
 }
 
-}  // namespace
-
-std::span<const RowField> row_fields() { return kRowFields; }
-
-std::string episode_key(const EpisodeRow& row) {
-  const std::string episode = std::to_string(row.episode);
-  std::string parts;
-  for (const std::string* part :
-       {&row.suite_hash, &row.detectors, &row.task, &row.clip, &episode, &row.arm, &row.policy, &row.policy_digest,
-        &row.controller, &row.controller_digest, &row.engine, &row.perturbation}) {
-    // The length first, so that no two different lists of parts read the same.
-    parts += std::to_string(part->size());
-    parts += ':';
-    parts += *part;
-  }
-  return sha256_hex(parts);
+JsonKey<Row> tags_key() {
+  return {{.name = "tags",
+           .meaning = "what the suite says of the episode beside names, by name; absent where it says nothing "
+                      "([Tags](../file-formats.md#tags))",
+           .optional = true},
+          "name: text",
+          [](const Row& row) { return nlohmann::json(row.tags.map()); },
+          [](const JsonNode& node, Row& row) {
+            Tags tags;
+            read_json(node, {}, tags);
+            row.tags = RowTags(std::move(tags));
+          }};
 }
-
-nlohmann::json to_json(const EpisodeRow& row) {
-  nlohmann::json json = {{"schema", kRowSchema}};
-  for (const RowField& field : kRowFields) write_member(field.json, row, json);
-  return json;
-}
-
-EpisodeRow row_from_json(const nlohmann::json& json) {
-  JsonFields fields(json, "episode row");
-  EpisodeRow row;
-  check_schema(fields);
-  for (const RowField& field : kRowFields) {
-    read_member(field.json, fields, row);
-    if (field.use.check != nullptr) field.use.check(row);
-  }
-  fields.refuse_unknown();
-  return row;
-}
-
-namespace {
-
-constexpr auto kVerdictMembers = std::to_array<JsonMember<Verdict>>({
-    {"version", &Verdict::version,
-     "`paper` (as printed), `robot` (the performer's tracks are the robot's), `interaction` (the rule)"},
-    {"thresholds", &Verdict::thresholds, "`paper`, `strict`, `act`"},
-    {"success", &Verdict::success, "whether the detector saw the act"},
-    {"parts", &Verdict::parts, "conditions that hold or not"},
-    {"values", &Verdict::values, "what the conditions are of; `duet list detectors` has names and units"},
-    {"margins", &Verdict::margins, "of each condition; a positive one is satisfied"},
-    {"frames", &Verdict::frames, "number of evidence frames"},
-});
-
-constexpr auto kTraceMembers = std::to_array<JsonMember<StateTrace>>({
-    {"rate_hz", &StateTrace::rate_hz, "frames a second; frame i is at i / rate_hz", "Hz", true},
-    {"points", &StateTrace::points, "`root`, `left_hand`, `right_hand`"},
-    {"mm", &StateTrace::mm, "one list per frame: x, y, z of each point in turn, frame W", "mm"},
-});
-
-constexpr auto kFaultMembers = std::to_array<JsonMember<ControllerFaults>>({
-    {"observations", &ControllerFaults::observations, "ticks on which the state or the reference was not finite"},
-    {"actions", &ControllerFaults::actions, "ticks on which the command was not finite"},
-    {"stopped", &ControllerFaults::stopped, "whether it ended in its safe stop"},
-});
-
-constexpr auto kPolicyFaultMembers = std::to_array<JsonMember<PolicyFaults>>({
-    {"late", &PolicyFaults::late, "plans that did not come in time"},
-    {"invalid", &PolicyFaults::invalid, "plans that could not be used: not finite, of the wrong size, not unit"},
-    {"dead", &PolicyFaults::dead, "whether it gave no plan any more; the outcome is then `error`"},
-    {"message", &PolicyFaults::message, "of the first fault"},
-});
-
-constexpr auto kPolicyTimeMembers = std::to_array<JsonMember<PlanTimes>>({
-    {"p50", &PlanTimes::p50, "median; null where no plan was asked for", "ms"},
-    {"p95", &PlanTimes::p95, "95th percentile", "ms"},
-    {"max", &PlanTimes::max, "longest", "ms"},
-});
-
-constexpr auto kFootMembers = std::to_array<JsonMember<FootTrace>>({
-    {"rate_hz", &FootTrace::rate_hz, "frames a second; frame i is at i / rate_hz", "Hz", true},
-    {"left_mm", &FootTrace::left_mm, "height of the left sole's lowest point over the ground, one per frame", "mm"},
-    {"right_mm", &FootTrace::right_mm, "likewise of the right sole", "mm"},
-});
-
-constexpr auto kContactMembers = std::to_array<JsonMember<RowContact>>({
-    {"link", &RowContact::link, "name of the robot's link"},
-    {"region", &RowContact::region, "body region of the human"},
-    {"capsule", &RowContact::capsule, "name of the human's capsule"},
-    {"begin_s", &RowContact::begin_s, "from the episode's begin", "s"},
-    {"duration_s", &RowContact::duration_s, "how long it lasted", "s"},
-    {"peak_n", &RowContact::peak_n, "largest force", "N"},
-    {"impulse_ns", &RowContact::impulse_ns, "of the force's magnitude", "N s"},
-    {"depth_m", &RowContact::depth_m, "largest depth", "m"},
-    {"windowed_mean_n", &RowContact::windowed_mean_n, "largest mean force over 0.1 s", "N"},
-});
 
 // The fault of a trace, "" where it has none.
 std::string fault_of(const StateTrace& trace) {
-  if (trace.mm.empty()) return "";
+  if (trace.mm.empty()) return "key 'mm': expected at least one frame, found none";
   if (!std::isfinite(trace.rate_hz) || trace.rate_hz <= 0.0)
     return fmt::format("key 'rate_hz': expected a number above 0, found {}", trace.rate_hz);
   const std::set<std::string> distinct(trace.points.begin(), trace.points.end());
@@ -231,43 +171,125 @@ std::string fault_of(const FootTrace& feet) {
                      feet.left_mm.size(), feet.right_mm.size());
 }
 
+bool is_empty(const StateTrace& trace) { return trace.mm.empty(); }
+bool is_empty(const FootTrace& feet) { return feet.left_mm.empty() && feet.right_mm.empty(); }
+
+// A trace, null where it is empty.
 template <typename Trace>
-void read_trace(JsonFields& fields, const std::string& key, Trace& trace) {
-  if (fields.at(key).is_null()) return;
-  const std::string what = fields.what() + ": " + key;
-  trace = part_from_json<Trace>(fields.at(key), what);
-  if (const std::string fault = fault_of(trace); !fault.empty()) throw InputError(what + ": " + fault);
+JsonKey<Row> trace_key(const FieldDoc& words, Trace Row::*member) {
+  const auto write = [words, member](const Row& row) {
+    if (is_empty(row.*member)) return nlohmann::json();
+    const std::string fault = fault_of(row.*member);
+    require(fault.empty(), "episode row: {}: {}", words.name, fault);
+    return json_mapping(row.*member);
+  };
+  const auto read = [member](const JsonNode& node, Row& row) {
+    if (node.value().is_null()) return;
+    row.*member = read_mapping<Trace>(node);
+    if (const std::string fault = fault_of(row.*member); !fault.empty()) node.fail(fault);
+  };
+  JsonKey<Row> key(words, "object or null", write, read);
+  key.members = json_members<Trace>();
+  return key;
 }
 
 }  // namespace
 
-template <>
-std::span<const JsonMember<Verdict>> part_members<Verdict>() {
-  return kVerdictMembers;
-}
-template <>
-std::span<const JsonMember<StateTrace>> part_members<StateTrace>() {
-  return kTraceMembers;
-}
-template <>
-std::span<const JsonMember<ControllerFaults>> part_members<ControllerFaults>() {
-  return kFaultMembers;
-}
-template <>
-std::span<const JsonMember<PolicyFaults>> part_members<PolicyFaults>() {
-  return kPolicyFaultMembers;
-}
-template <>
-std::span<const JsonMember<PlanTimes>> part_members<PlanTimes>() {
-  return kPolicyTimeMembers;
-}
-template <>
-std::span<const JsonMember<FootTrace>> part_members<FootTrace>() {
-  return kFootMembers;
-}
-template <>
-std::span<const JsonMember<RowContact>> part_members<RowContact>() {
-  return kContactMembers;
+const std::vector<RowField>& row_fields() {
+  static const std::vector<RowField> fields = {
+      {{"key",
+        "SHA-256 over suite hash, detectors, task, clip, episode, arm, policy, policy digest, controller, controller "
+        "digest, engine, perturbation, each as `<length>:<text>`; once per run; checked on reading"},
+       &Row::key,
+       {.scanned = true, .check = check_key}},
+      {{"suite", "name of the suite"}, &Row::suite, {.scanned = true}},
+      {{"suite_version", "rows compare only within one name and version"}, &Row::suite_version, {.scanned = true}},
+      {{"suite_hash", "SHA-256 of the resolved suite"}, &Row::suite_hash, {.scanned = true, .tabled = false}},
+      {{"task", "a name of `duet list tasks`"}, &Row::task, {.scanned = true}},
+      {{"clip", "id of the clip"}, &Row::clip, {.scanned = true}},
+      {{"episode", "number from 0"}, &Row::episode, {.scanned = true}},
+      {{"seed", "what all randomness of the episode comes from"}, &Row::seed},
+      {{"engine", "a name of `duet list engines`"}, &Row::engine, {.scanned = true}},
+      {{"engine_version", "as the engine says it"}, &Row::engine_version},
+      {{"engine_profile", "`parity`, `fast`, ..."}, &Row::engine_profile, {.scanned = true}},
+      {{"profile_digest",
+        "SHA-256 of the engine's resolved profile. Not part of `key`: the suite hash covers what the profile says"},
+       &Row::profile_digest,
+       {.scanned = true, .tabled = false}},
+      {{"controller", "as the suite names it"}, &Row::controller, {.scanned = true}},
+      {{"controller_digest", "SHA-256 of what it is; empty where its files were not there"},
+       &Row::controller_digest,
+       {.scanned = true, .tabled = false}},
+      {{"policy", "as the suite names it"}, &Row::policy, {.scanned = true}},
+      {{"policy_digest", "SHA-256 of what it is; empty where its files were not there"},
+       &Row::policy_digest,
+       {.scanned = true, .tabled = false}},
+      {{"perturbation", "`clean` or the name of one in the suite"}, &Row::perturbation, {.scanned = true}},
+      {{"robot_digest", "SHA-256 of the robot model, the controller's own body; empty where the controller is absent"},
+       &Row::robot_digest,
+       {.scanned = true, .tabled = false}},
+      {{"arm",
+        "`main`, `null` (a robot that stands still), `control` (a scripted policy that no score may reward), "
+        "`shuffled` "
+        "(a policy that sees the partner of another clip)"},
+       &Row::arm,
+       {.scanned = true, .check = check_arm}},
+      {{.name = "outcome",
+        .meaning = "`ok`, `fell`, `diverged`, `timeout`, `unsupported`, `error`",
+        .choices = outcome_names()},
+       &Row::outcome,
+       {.scanned = true}},
+      {{"message", "why, where the outcome is not `ok`; else empty"}, &Row::message},
+      {tags_key(), &Row::tags},
+      {{"detectors", "version of the detectors' code"}, &Row::detectors, {.scanned = true}},
+      {{"success", "headline verdict; `null`: no detector ruled. Counted as success only where the outcome is `ok`"},
+       &Row::success},
+      {{"verdicts", "of every detector"}, &Row::verdicts},
+      {{.name = "metrics",
+        .meaning =
+            "names, units and directions: `duet list metrics`. `onset_s`: the first time from 1 s on at which a hand "
+            "of the "
+            "robot, in the pelvis frame, is 0.12 m from its median place over the first second, as a mean over the "
+            "next 0.2 "
+            "s, and stays there for 0.6 s (arms that swing with the steps do not); `partner_onset_s`: the same of the "
+            "partner's wrists in the frame of its root",
+        .finite = true},
+       &Row::metrics},
+      {{"fell", "at any time in the episode"}, &Row::fell},
+      {{"frames", "recorded frames"}, &Row::frames},
+      {{"sim_s", "simulated time", "s"}, &Row::sim_s},
+      {{"wall_s", "real time", "s"}, &Row::wall_s, {.repeats = false}},
+      {{"contact_peak_n", "largest force of the human on the robot", "N"}, &Row::contact_peak_n},
+      {{"contact_impulse_ns", "impulse of the human on the robot", "N s"}, &Row::contact_impulse_ns},
+      {{.name = "forces",
+        .meaning = "contact forces by dotted name: `ground.mean_n`, `human.peak_n`, `human.chest.peak_n`, ... The "
+                   "ending is the "
+                   "unit: `_n` [N], `_ns` [N s], `_s` [s], `_n_cm2` [N/cm^2]; any other: a ratio or a flag",
+        .finite = true},
+       &Row::forces},
+      {{"contacts",
+        "contacts of one robot link with one capsule of a solid human, the 16 with the largest peak force, by begin"},
+       &Row::contacts,
+       {.tabled = false}},
+      {{"contacts_total", "number of such contacts, those left out included"}, &Row::contacts_total},
+      {trace_key({"trace", "where a few points were"}, &Row::trace), &Row::trace, {.heavy = true, .tabled = false}},
+      {trace_key({"feet", "of a controller that walks, in an engine, the main arm: height of its soles"}, &Row::feet),
+       &Row::feet,
+       {.heavy = true, .tabled = false}},
+      {{"late_plans", "ticks without a plan in time"}, &Row::late_plans},
+      {{"faults", "of the controller"}, &Row::faults},
+      {{"policy_faults",
+        "of the policy. A plan that fails is left out and the last one held; an episode whose policy is dead has the "
+        "outcome `error`"},
+       &Row::policy_faults,
+       {.columns = "policy"}},
+      {{"policy_ms", "wall time of a plan"}, &Row::policy_ms, {.repeats = false}},
+      {{"state_hash", "SHA-256 over the state trajectory; equal on the same program and machine"},
+       &Row::state_hash,
+       {.scanned = true}},
+      {{"started_at", "UTC, ISO 8601"}, &Row::started_at, {.scanned = true, .repeats = false, .tabled = false}},
+  };
+  return fields;
 }
 
 const Tags& RowTags::map() const {
@@ -285,24 +307,35 @@ double RowTags::number(std::string_view name) const {
   return parse_number(text(name)).value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
-nlohmann::json json_value(const RowTags& tags, bool) { return tags.map(); }
-void read_value(JsonFields& fields, const std::string& key, bool, RowTags& tags) { tags = RowTags(fields.texts(key)); }
-std::string_view value_words(ValueType<RowTags>, bool) { return "name: text"; }
+std::string episode_key(const EpisodeRow& row) {
+  const std::string episode = std::to_string(row.episode);
+  std::string parts;
+  for (const std::string* part :
+       {&row.suite_hash, &row.detectors, &row.task, &row.clip, &episode, &row.arm, &row.policy, &row.policy_digest,
+        &row.controller, &row.controller_digest, &row.engine, &row.perturbation}) {
+    // The length first, so that no two different lists of parts read the same.
+    parts += std::to_string(part->size());
+    parts += ':';
+    parts += *part;
+  }
+  return sha256_hex(parts);
+}
 
-nlohmann::json json_value(const StateTrace& trace, bool) {
-  const std::string fault = fault_of(trace);
-  require(fault.empty(), "episode row: trace: " + fault);
-  return trace.mm.empty() ? nlohmann::json(nullptr) : part_json(trace);
+nlohmann::json to_json(const EpisodeRow& row) {
+  nlohmann::json json = {{"schema", kRowSchema}};
+  for (const RowField& field : row_fields())
+    if (nlohmann::json value = field.write(row); !field.optional || !value.empty()) json[field.name] = std::move(value);
+  return json;
 }
-nlohmann::json json_value(const FootTrace& feet, bool) {
-  if (feet.left_mm.empty() && feet.right_mm.empty()) return nullptr;
-  const std::string fault = fault_of(feet);
-  require(fault.empty(), "episode row: feet: " + fault);
-  return part_json(feet);
+
+EpisodeRow row_from_json(const nlohmann::json& json) {
+  const JsonNode node(json, "episode row");
+  require_schema(node, kRowSchema);
+  EpisodeRow row;
+  read_mapping(node, row_fields(), row, "schema");
+  for (const RowField& field : row_fields())
+    if (field.use.check != nullptr) field.use.check(row);
+  return row;
 }
-void read_value(JsonFields& fields, const std::string& key, bool, StateTrace& trace) { read_trace(fields, key, trace); }
-void read_value(JsonFields& fields, const std::string& key, bool, FootTrace& feet) { read_trace(fields, key, feet); }
-std::string_view value_words(ValueType<StateTrace>, bool) { return "object or null"; }
-std::string_view value_words(ValueType<FootTrace>, bool) { return "object or null"; }
 
 }  // namespace duet

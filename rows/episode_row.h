@@ -3,12 +3,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "duet/core/episode_facts.h"
@@ -70,88 +73,20 @@ struct RowContact : ContactFacts {
 
 inline constexpr std::size_t kMostRowContacts = 16;
 
-template <typename Part>
-std::span<const JsonMember<Part>> part_members() = delete;
 template <>
-std::span<const JsonMember<Verdict>> part_members<Verdict>();
+const JsonSchema<Verdict>& json_schema<Verdict>();
 template <>
-std::span<const JsonMember<StateTrace>> part_members<StateTrace>();
+const JsonSchema<StateTrace>& json_schema<StateTrace>();
 template <>
-std::span<const JsonMember<ControllerFaults>> part_members<ControllerFaults>();
+const JsonSchema<ControllerFaults>& json_schema<ControllerFaults>();
 template <>
-std::span<const JsonMember<PolicyFaults>> part_members<PolicyFaults>();
+const JsonSchema<PolicyFaults>& json_schema<PolicyFaults>();
 template <>
-std::span<const JsonMember<PlanTimes>> part_members<PlanTimes>();
+const JsonSchema<PlanTimes>& json_schema<PlanTimes>();
 template <>
-std::span<const JsonMember<FootTrace>> part_members<FootTrace>();
+const JsonSchema<FootTrace>& json_schema<FootTrace>();
 template <>
-std::span<const JsonMember<RowContact>> part_members<RowContact>();
-
-template <typename T>
-concept RowPart = requires {
-  part_members<T>();
-};
-
-// A trace without frames is null. Throw std::invalid_argument for a trace whose frames do not fit its points, and for
-// feet of different lengths.
-nlohmann::json json_value(const RowTags& tags, bool finite);
-nlohmann::json json_value(const StateTrace& trace, bool finite);
-nlohmann::json json_value(const FootTrace& feet, bool finite);
-void read_value(JsonFields& fields, const std::string& key, bool finite, RowTags& tags);
-void read_value(JsonFields& fields, const std::string& key, bool finite, StateTrace& trace);
-void read_value(JsonFields& fields, const std::string& key, bool finite, FootTrace& feet);
-std::string_view value_words(ValueType<RowTags>, bool finite);
-std::string_view value_words(ValueType<StateTrace>, bool finite);
-std::string_view value_words(ValueType<FootTrace>, bool finite);
-
-template <RowPart Part>
-nlohmann::json part_json(const Part& part) {
-  nlohmann::json json = nlohmann::json::object();
-  for (const JsonMember<Part>& known : part_members<Part>()) write_member(known, part, json);
-  return json;
-}
-
-// `what`: of messages, "episode row: faults".
-template <RowPart Part>
-Part part_from_json(const nlohmann::json& json, const std::string& what) {
-  JsonFields fields(json, what);
-  Part part;
-  for (const JsonMember<Part>& known : part_members<Part>()) read_member(known, fields, part);
-  fields.refuse_unknown();
-  return part;
-}
-
-template <RowPart Part>
-nlohmann::json json_value(const Part& part, bool) {
-  return part_json(part);
-}
-template <RowPart Part>
-void read_value(JsonFields& fields, const std::string& key, bool, Part& part) {
-  part = part_from_json<Part>(fields.at(key), fields.what() + ": " + key);
-}
-template <RowPart Part>
-std::string_view value_words(ValueType<Part>, bool) {
-  return "object";
-}
-
-template <RowPart Part>
-nlohmann::json json_value(const std::vector<Part>& parts, bool) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const Part& part : parts) list.push_back(part_json(part));
-  return list;
-}
-// The key is a plural: one of "verdicts" is "verdict 0".
-template <RowPart Part>
-void read_value(JsonFields& fields, const std::string& key, bool, std::vector<Part>& parts) {
-  parts.clear();
-  for (const nlohmann::json& item : fields.list(key))
-    parts.push_back(part_from_json<Part>(
-        item, fields.what() + ": " + key.substr(0, key.size() - 1) + " " + std::to_string(parts.size())));
-}
-template <RowPart Part>
-std::string_view value_words(ValueType<std::vector<Part>>, bool) {
-  return "list of objects";
-}
+const JsonSchema<RowContact>& json_schema<RowContact>();
 
 inline constexpr int kRowSchema = 5;  // the only one that is read
 
@@ -212,15 +147,26 @@ struct RowFieldUse {
   void (*check)(const EpisodeRow&) = nullptr;  // throws InputError for a value that the type allows and the field not
 };
 
-struct RowField {
-  JsonMember<EpisodeRow, RowTags, std::vector<Verdict>, std::vector<RowContact>, StateTrace, FootTrace,
-             ControllerFaults, PolicyFaults, PlanTimes>
-      json;
-  RowFieldUse use = {};
+struct RowField : JsonKey<EpisodeRow> {
+  template <typename Member>
+  RowField(JsonKey<EpisodeRow> key, Member EpisodeRow::*member, RowFieldUse used = {})
+      : JsonKey<EpisodeRow>(std::move(key)), use(used), clear([member](EpisodeRow& row) { row.*member = Member(); }) {
+    if constexpr (std::is_constructible_v<ScannedMember, Member EpisodeRow::*>) scanned = member;
+  }
+  template <typename Member>
+  RowField(FieldDoc words, Member EpisodeRow::*member, RowFieldUse used = {})
+      : RowField(JsonKey<EpisodeRow>(std::move(words), member), member, used) {}
+
+  using ScannedMember =
+      std::variant<std::monostate, std::string EpisodeRow::*, int EpisodeRow::*, Outcome EpisodeRow::*>;
+
+  RowFieldUse use;
+  ScannedMember scanned;                   // of a type that a scan knows
+  std::function<void(EpisodeRow&)> clear;  // gives the field the value that it has in a new row
 };
 
 // All fields, in the order of the columns of results.sqlite.
-std::span<const RowField> row_fields();
+const std::vector<RowField>& row_fields();
 
 // SHA-256 over what makes the episode what it is: suite hash, detectors, task, clip, episode, arm, policy and
 // controller with their digests, engine and perturbation. The profile's settings of the engine are in the suite hash.

@@ -10,9 +10,7 @@
 #include <cerrno>
 #include <set>
 #include <system_error>
-#include <type_traits>
 #include <utility>
-#include <variant>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
@@ -25,13 +23,11 @@ namespace {
 constexpr std::array<std::string_view, 3> kLeftInTheFile = {"contacts", "feet", "trace"};
 constexpr std::size_t kUsualLine = 1 << 14;  // [bytes]
 
-template <typename Trace>
-Trace trace_in(std::string_view line, const char* key) {
-  const nlohmann::json json = {{key, parse_json(scan_member(line, key), "episode row")}};
-  JsonFields fields(json, "episode row");
-  Trace trace;
-  read_value(fields, key, false, trace);
-  return trace;
+EpisodeRow row_of_field(std::string_view line, const std::string& name) {
+  const nlohmann::json json = parse_json(scan_member(line, name), "episode row");
+  EpisodeRow row;
+  std::ranges::find(row_fields(), name, &RowField::name)->read(JsonNode(json, "episode row: " + name), row);
+  return row;
 }
 
 }  // namespace
@@ -45,8 +41,7 @@ EpisodeRow row_without_traces(std::string_view line) {
 void make_lean(EpisodeRow& row, std::int64_t line_at) {
   FootTrace feet = std::move(row.feet);
   for (const RowField& field : row_fields())
-    if (!field.use.tabled)
-      std::visit([&](auto member) { row.*member = std::remove_cvref_t<decltype(row.*member)>(); }, field.json.member);
+    if (!field.use.tabled) field.clear(row);
   row.feet = std::move(feet);
   for (Verdict& verdict : row.verdicts) {
     verdict.margins.clear();
@@ -99,11 +94,11 @@ std::string RowFile::line_of(const EpisodeRow& row) const {
 }
 
 StateTrace RowFile::trace(const EpisodeRow& row) const {
-  return row.line_at < 0 ? row.trace : trace_in<StateTrace>(line_of(row), "trace");
+  return row.line_at < 0 ? row.trace : row_of_field(line_of(row), "trace").trace;
 }
 
 FootTrace RowFile::feet(const EpisodeRow& row) const {
-  return row.line_at < 0 ? row.feet : trace_in<FootTrace>(line_of(row), "feet");
+  return row.line_at < 0 ? row.feet : row_of_field(line_of(row), "feet").feet;
 }
 
 namespace {
@@ -157,7 +152,7 @@ nlohmann::json repeatable(EpisodeRow row, bool with_tags) {
   if (!with_tags) row.tags = {};
   nlohmann::json json = to_json(row);
   for (const RowField& field : row_fields())
-    if (!field.use.repeats) json.erase(std::string(field.json.name));
+    if (!field.use.repeats) json.erase(field.name);
   return json;
 }
 

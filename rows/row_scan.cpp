@@ -35,11 +35,11 @@ const std::vector<ScanField>& scan_fields() {
     std::vector<ScanField> made = {{.name = "schema"}};
     for (const RowField& field : row_fields()) {
       ScanField& known = made.emplace_back(
-          ScanField{.name = field.json.name, .scanned = field.use.scanned, .wall_time = !field.use.repeats});
+          ScanField{.name = field.name, .scanned = field.use.scanned, .wall_time = !field.use.repeats});
       if (!field.use.scanned) continue;
-      if (const auto* text = std::get_if<std::string EpisodeRow::*>(&field.json.member)) known.text = *text;
-      if (const auto* whole = std::get_if<int EpisodeRow::*>(&field.json.member)) known.whole = *whole;
-      if (const auto* outcome = std::get_if<Outcome EpisodeRow::*>(&field.json.member)) known.outcome = *outcome;
+      if (const auto* text = std::get_if<std::string EpisodeRow::*>(&field.scanned)) known.text = *text;
+      if (const auto* whole = std::get_if<int EpisodeRow::*>(&field.scanned)) known.whole = *whole;
+      if (const auto* outcome = std::get_if<Outcome EpisodeRow::*>(&field.scanned)) known.outcome = *outcome;
     }
     std::ranges::sort(made, {}, &ScanField::name);
     return made;

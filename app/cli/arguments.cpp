@@ -24,7 +24,7 @@ void add_field(CLI::App& command, const FieldDoc& words, const std::string& valu
   const auto read = [flag, set](const std::vector<std::string>& texts) {
     const std::string text = fmt::format("{}", fmt::join(texts, " "));
     const std::string expected = set(text);
-    require(expected.empty(), field_refusal(flag, expected, text));
+    require(expected.empty(), field_refusal(flag, expected, text, ""));
   };
   command
       .add_option_function<std::vector<std::string>>((words.name == "output" ? "-o," : "") + flag.name, read,

@@ -67,12 +67,10 @@ EngineSettings Profile::settings(const std::string& engine) const {
 
 Profile read_profile(const YAML::Node& document, const std::string& file) {
   const YamlSection top(file, document, "profile", {"schema", "name", "about", "engines"});
-  if (top.has("schema") && top.text("schema") != kProfileSchema)
-    top.fail(top.line("schema"), fmt::format("schema: expected '{}', found '{}'", kProfileSchema, top.text("schema")));
+  if (top.has("schema")) top.require_schema(kProfileSchema);
   Profile profile{.name = top.text("name"), .about = top.has("about") ? top.text("about") : "", .engines = {}};
   const YAML::Node node = top.node("engines");
-  if (!node.IsMap())
-    top.fail(top.line("engines"), fmt::format("engines: expected a mapping, found {}", describe(node)));
+  if (!node.IsMap()) top.refuse_key("engines", "a mapping", node);
   const std::vector<std::string> known = physics_engines();
   for (const auto& entry : node) {
     const std::string engine = entry.first.as<std::string>();
@@ -119,7 +117,8 @@ std::string settings_yaml(const EngineSettings& settings) {
 std::string resolved_settings(const std::string& engine, const EngineSettings& settings) {
   EngineSettings all = settings;
   if (is_available(engine))
-    for (const EngineOption& option : engine_module(engine).options) all.options.try_emplace(option.name, option.value);
+    for (const EngineOption& option : engine_module(engine).options)
+      all.options.try_emplace(option.name, option.text({}));
   return settings_yaml(all);
 }
 

@@ -10,7 +10,7 @@
 #include "duet/core/require.h"
 #include "duet/metrics/contact_limits.h"
 #include "duet/robots/robot_model.h"
-#include "duet/robots/yaml_section.h"
+#include "duet/robots/yaml_schema.h"
 
 namespace duet {
 namespace {
@@ -202,16 +202,9 @@ std::string default_name(const Eigen::Vector3d& velocity) {
   return fmt::format("{}_{}", kNames[axis][velocity[axis] < 0.0], std::abs(velocity[axis]));
 }
 
-constexpr std::array<const char*, 3> kUpperBodies = {"still", "held", "moving"};  // in the order of UpperBody
-
-UpperBody read_upper_body(const YamlSection& item) {
-  if (!item.has("upper_body")) return UpperBody::kStill;
-  const std::string text = item.text("upper_body");
-  const auto found = std::ranges::find(kUpperBodies, text);
-  if (found == kUpperBodies.end())
-    item.fail(item.line("upper_body"),
-              fmt::format("upper_body: expected 'still', 'held' or 'moving', found '{}'", text));
-  return static_cast<UpperBody>(found - kUpperBodies.begin());
+const std::vector<std::string>& upper_bodies() {
+  static const std::vector<std::string> names = {"still", "held", "moving"};  // in the order of UpperBody
+  return names;
 }
 
 SuiteReference read_reference(const YAML::Node& node, const std::string& file) {
@@ -220,16 +213,19 @@ SuiteReference read_reference(const YAML::Node& node, const std::string& file) {
   SuiteReference reference;
   reference.velocity = item.vector3("velocity");
   if (reference.velocity.cwiseAbs().maxCoeff() > 10.0)
-    item.fail(item.line("velocity"), "velocity: expected at most 10 m/s and 10 rad/s");
-  reference.seconds = in_range(item, "seconds", reference.seconds, {0.2, 600.0, true});
-  reference.begin = in_range(item, "begin", 0.0, {0.0, reference.seconds, true});
-  reference.end = in_range(item, "end", reference.seconds, {reference.begin, reference.seconds, true});
-  reference.pause = in_range(item, "pause", 0.0, {0.0, 600.0, true});
-  reference.upper_body = read_upper_body(item);
+    item.fail_key("velocity", "expected at most 10 m/s and 10 rad/s");
+  const auto time = [&](const char* key, double low, double high, double& out) {
+    read_optional(item, {.name = key, .unit = "s", .range = {low, high}}, out);
+  };
+  time("seconds", 0.2, 600.0, reference.seconds);
+  time("begin", 0.0, reference.seconds, reference.begin);
+  reference.end = reference.seconds;
+  time("end", reference.begin, reference.seconds, reference.end);
+  time("pause", 0.0, 600.0, reference.pause);
+  read_optional(item, {.name = "upper_body", .choices = upper_bodies()}, reference.upper_body);
   reference.tags = read_tags(item, kOfClip);
   reference.name = item.has("name") ? item.text("name") : default_name(reference.velocity);
-  if (!is_plain_name(reference.name))
-    item.fail(item.line("name"), fmt::format("name: {}", plain_name_message(reference.name)));
+  if (!is_plain_name(reference.name)) item.fail_key("name", plain_name_message(reference.name));
   return reference;
 }
 
@@ -245,9 +241,9 @@ std::vector<SuiteReference> read_references(const YamlSection& suite, const std:
     const auto same = [&](const SuiteReference& other) { return other.name == list.back().name; };
     if (std::count_if(list.begin(), list.end(), same) > 1)
       suite.fail(std::max(item.Mark().line, 0) + 1,
-                 fmt::format("reference: '{}' is there twice; names tell rows apart", list.back().name));
+                 fmt::format("key 'reference': '{}' is there twice; names tell rows apart", list.back().name));
   }
-  if (list.empty()) suite.fail(suite.line("reference"), "reference: expected at least one, found none");
+  if (list.empty()) suite.fail_key("reference", "expected at least one, found none");
   return list;
 }
 
@@ -258,7 +254,7 @@ std::string references_yaml(const std::vector<SuiteReference>& references) {
     text += fmt::format(
         "\n  - {{name: {}, velocity: [{}, {}, {}], seconds: {}, begin: {}, end: {}, pause: {}, upper_body: {}{}}}",
         reference.name, v.x(), v.y(), v.z(), reference.seconds, reference.begin, reference.end, reference.pause,
-        kUpperBodies.at(static_cast<std::size_t>(reference.upper_body)), tags_yaml(reference.tags));
+        upper_bodies().at(static_cast<std::size_t>(reference.upper_body)), tags_yaml(reference.tags));
   }
   return text;
 }

@@ -36,8 +36,7 @@ Options read_options(const YamlSection& item, const Suite& suite) {
   Options options;
   if (!item.has("options")) return options;
   const YAML::Node node = item.node("options");
-  if (!node.IsMap())
-    item.fail(item.line("options"), fmt::format("options: expected a mapping, found {}", describe(node)));
+  if (!node.IsMap()) item.refuse_key("options", "a mapping", node);
   for (const auto& entry : node) {
     const auto name = entry.first.as<std::string>();
     if (!entry.second.IsScalar())
@@ -82,7 +81,7 @@ bool reads_shuffled(const YamlSection& item) {
   if (!item.has("partner")) return false;
   const std::string partner = item.text("partner");
   if (partner != "own" && partner != "shuffled")
-    item.fail(item.line("partner"), fmt::format("partner: expected 'own' or 'shuffled', found '{}'", partner));
+    item.fail_key("partner", fmt::format("expected 'own' or 'shuffled', found '{}'", partner));
   return partner == "shuffled";
 }
 
@@ -124,12 +123,10 @@ void read_list(const YamlSection& top, const char* key, const char* kind,
     try {
       add(node);
     } catch (const std::invalid_argument& error) {
-      top.fail(std::max(node.Mark().line, 0) + 1, fmt::format("{}: {}", key, error.what()));
+      top.fail(std::max(node.Mark().line, 0) + 1, fmt::format("key '{}': {}", key, error.what()));
     }
   }
-  if (items.empty())
-    top.fail(top.has(key) ? top.line(key) : top.line(),
-             fmt::format("{}: expected at least one {}, found none", key, kind));
+  if (items.empty()) top.fail_key(key, fmt::format("expected at least one {}, found none", kind));
 }
 
 std::string options_yaml(const std::map<std::string, std::string>& options) {
@@ -243,12 +240,11 @@ const FieldTable<ClipVariant>& variant_fields() {
 }
 
 ClipVariant read_variant(const YAML::Node& node, const std::string& file) {
-  const YamlSection item(file, node, "variant", field_keys(variant_fields()));
+  const YamlSection item(file, node, "variant", key_names(variant_fields()));
   ClipVariant variant;
   static_cast<void>(item.text("name"));  // it has to be there
   read_fields(item, variant_fields(), variant);
-  if (!is_plain_name(variant.name))
-    item.fail(item.line("name"), fmt::format("name: {}", plain_name_message(variant.name)));
+  if (!is_plain_name(variant.name)) item.fail_key("name", plain_name_message(variant.name));
   if (!variant.side && !variant.target_height && !variant.distance && !variant.outcome)
     item.fail(item.line(), "expected side, target_height, distance or outcome, found none");
   return variant;
@@ -260,7 +256,7 @@ void read_variants(const YamlSection& synth, Suite& suite) {
     const std::string& name = suite.clips.variants.back().name;
     const auto same = [&](const ClipVariant& other) { return other.name == name; };
     if (std::count_if(suite.clips.variants.begin(), suite.clips.variants.end(), same) > 1)
-      synth.fail(synth.line("variants"), fmt::format("variants: '{}' is there twice; names tell clips apart", name));
+      synth.fail_key("variants", fmt::format("'{}' is there twice; names tell clips apart", name));
   }
 }
 
@@ -280,7 +276,7 @@ void use_clip_files(const YamlSection& clips, Suite& suite) {
       const bool folder = std::filesystem::is_directory(path);
       for (std::string& found : folder ? find_clip_files({path}) : std::vector{path}) files.push_back(std::move(found));
     } catch (const InputError& error) {
-      clips.fail(clips.line("files"), fmt::format("files: {}", error.what()));
+      clips.fail_key("files", error.what());
     }
   }
   suite.clips.files = std::move(files);
@@ -354,13 +350,13 @@ const Field<SuiteClips>& roles_field() {
 
 void read_clips(const YamlSection& top, Suite& suite) {
   const YamlSection clips = section_below(top, suite.file, "clips", {"synth", "files", "pad", "roles"});
-  std::vector<const char*> synth_keys = field_keys(synth_fields());
+  std::vector<const char*> synth_keys = key_names(synth_fields());
   synth_keys.push_back("variants");
   const YamlSection synth = section_below(clips, suite.file, "synth", synth_keys);
   read_fields(synth, synth_fields(), suite.clips);
   read_variants(synth, suite);
   read_files(clips, suite);
-  read_fields(section_below(clips, suite.file, "pad", field_keys(padding_fields())), padding_fields(), suite.clips.pad);
+  read_fields(section_below(clips, suite.file, "pad", key_names(padding_fields())), padding_fields(), suite.clips.pad);
   read_field(clips, roles_field(), suite.clips);
   check_clips(clips, synth, suite.clips);
   use_clip_files(clips, suite);

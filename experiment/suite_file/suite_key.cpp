@@ -37,10 +37,9 @@ SuiteKey choices_key(const std::string& name, const FieldRow& row, SuiteChoices 
   const auto read = [name, member, check](const YamlSection& top, Suite& suite) {
     if (!top.has(name.c_str())) return;
     const YAML::Node node = top.node(name.c_str());
-    if (!node.IsMap())
-      top.fail(top.line(name.c_str()), fmt::format("{}: expected a mapping, found {}", name, describe(node)));
+    if (!node.IsMap()) top.refuse_key(name.c_str(), "a mapping", node);
     const auto fail_at = [&](int line, const std::string& message) {
-      top.fail(line, fmt::format("{}: {}", name, message));
+      top.fail(line, fmt::format("key '{}': {}", name, message));
     };
     SuiteChoices& found = suite.*member;
     for (const auto& entry : node) {
@@ -69,15 +68,14 @@ void checked(const YamlSection& section, const char* key, const std::function<vo
   try {
     read();
   } catch (const std::invalid_argument& error) {
-    section.fail(section.has(key) ? section.line(key) : section.line(), fmt::format("{}: {}", key, error.what()));
+    section.fail_key(key, error.what());
   }
 }
 
 std::vector<std::string> names_in(const YamlSection& section, const char* key) {
   std::vector<std::string> names;
   for (const YAML::Node& item : section.items(key)) {
-    if (!item.IsScalar())
-      section.fail(section.line(key), fmt::format("{}: expected names, found {}", key, describe(item)));
+    if (!item.IsScalar()) section.refuse_key(key, "names", item);
     names.push_back(item.Scalar());
   }
   return names;

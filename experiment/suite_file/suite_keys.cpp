@@ -31,11 +31,7 @@ using With = SuiteKey::With;
 constexpr const char* kSuiteSchema = "duet.suite/1";
 
 SuiteKey schema_key() {
-  const auto read = [](const YamlSection& top, Suite&) {
-    const std::string schema = top.text("schema");
-    if (schema != kSuiteSchema)
-      top.fail(top.line("schema"), fmt::format("schema: expected '{}', found '{}'", kSuiteSchema, schema));
-  };
+  const auto read = [](const YamlSection& top, Suite&) { top.require_schema(kSuiteSchema); };
   return SchemaKey<Suite>("schema", read, {{"schema", kSuiteSchema, "required", "of this file"}},
                           [](const Suite&) { return kSuiteSchema; });
 }

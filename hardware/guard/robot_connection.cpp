@@ -8,7 +8,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/robots/human_body.h"
-#include "duet/robots/yaml_section.h"
+#include "duet/robots/yaml_schema.h"
 
 namespace duet {
 
@@ -34,57 +34,36 @@ constexpr std::array<double, 24> kAdultBones = {0.12, 0.11, 0.11,  0.12,  0.40, 
                                                 0.42, 0.06, 0.135, 0.135, 0.20, 0.14, 0.14,  0.10,
                                                 0.11, 0.11, 0.29,  0.29,  0.25, 0.25, 0.085, 0.085};
 
-void read_limits(const std::string& file, const YAML::Node& node, HardwareLimits& limits) {
-  read_fields(YamlSection(file, node, "limits", field_keys(hardware_limit_fields())), hardware_limit_fields(), limits);
-}
-
 void read_touches(const YamlSection& top, std::vector<TouchPair>& touches) {
   for (const YAML::Node& node : top.items("touches")) {
     if (!node.IsSequence() || node.size() != 2 || !node[0].IsScalar() || !node[1].IsScalar())
       top.fail(node.Mark().line + 1,
-               fmt::format("'touches': expected [part of the robot, part of a person], found {}", describe(node)));
+               fmt::format("key 'touches': expected [part of the robot, part of a person], found {}", describe(node)));
     touches.push_back({node[0].Scalar(), node[1].Scalar()});
   }
 }
 
 int whole_number(const YamlSection& top, const char* key) {
   constexpr double kMost = 1e6;
-  const double number = top.number(key);
-  if (number != std::floor(number) || std::abs(number) > kMost)
-    top.fail(top.line(key), fmt::format("'{}': expected a whole number, found {}", key, number));
-  return static_cast<int>(number);
-}
-
-// The place of the key's value in a table of names.
-template <std::size_t N>
-std::size_t choice(const YamlSection& top, const char* key, const std::array<std::string_view, N>& names) {
-  const std::string text = top.text(key);
-  const auto found = std::ranges::find(names, text);
-  if (found == names.end())
-    top.fail(top.line(key), fmt::format("'{}': expected {}, found '{}'", key, fmt::join(names, ", "), excerpt(text)));
-  return static_cast<std::size_t>(found - names.begin());
+  int number = 0;
+  read_value(top, {.name = key, .range = {-kMost, kMost}}, number);
+  return number;
 }
 
 // A robot without a word of odometry has none.
 void read_executor(const YamlSection& top, RobotConfig& config) {
+  const auto names = [](const auto& table) { return std::vector<std::string>(table.begin(), table.end()); };
   config.odometry = config.twin ? OdometrySource::kTwin : OdometrySource::kNone;
-  if (top.has("executor")) config.executor = static_cast<ExecutorKind>(choice(top, "executor", kExecutorNames));
-  if (top.has("odometry")) config.odometry = static_cast<OdometrySource>(choice(top, "odometry", kOdometryNames));
+  read_optional(top, {.name = "executor", .choices = names(kExecutorNames)}, config.executor);
+  read_optional(top, {.name = "odometry", .choices = names(kOdometryNames)}, config.odometry);
 }
 
-void read_lcm(const std::string& file, const YAML::Node& node, LcmPlace& place) {
-  const YamlSection section(file, node, "lcm", {"group", "port", "interface", "hops"});
-  const auto whole = [&](const char* key, int low, int high, int fallback) {
-    const std::optional<double> number = section.optional_number(key);
-    if (!number) return fallback;
-    if (*number != std::floor(*number) || *number < low || *number > high)
-      section.fail(section.line(key), fmt::format("'{}': expected {} to {}, found {}", key, low, high, *number));
-    return static_cast<int>(*number);
-  };
-  if (section.has("group")) place.group = section.text("group");
-  place.port = whole("port", 1, 65535, place.port);
-  place.hops = whole("hops", 0, 255, place.hops);
-  if (section.has("interface")) place.interface = section.text("interface");
+const Schema<LcmPlace>& lcm_schema() {
+  using P = LcmPlace;
+  static const Schema<P> schema = {
+      optional_key({"group"}, &P::group), optional_key({.name = "port", .range = {1, 65535}}, &P::port),
+      optional_key({"interface"}, &P::interface), optional_key({.name = "hops", .range = {0, 255}}, &P::hops)};
+  return schema;
 }
 
 void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& config) {
@@ -92,15 +71,15 @@ void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& c
   constexpr double kFarthest = 2.0;  // of a camera from the base [m]
   config.X_BC.p = section.vector3("position");
   if (config.X_BC.p.norm() > kFarthest)
-    section.fail(section.line("position"), fmt::format("'position': expected at most {} m from the base, found {}",
-                                                       kFarthest, config.X_BC.p.norm()));
+    section.fail_key("position",
+                     fmt::format("expected at most {} m from the base, found {}", kFarthest, config.X_BC.p.norm()));
   const std::vector<YAML::Node> items = section.items("quat_wxyz");
   Eigen::Vector4d quat_wxyz = Eigen::Vector4d::Zero();
   for (std::size_t k = 0; k < std::min<std::size_t>(items.size(), 4); ++k)
     if (!items[k].IsScalar() || !YAML::convert<double>::decode(items[k], quat_wxyz[static_cast<Eigen::Index>(k)]))
-      section.fail(section.line("quat_wxyz"), "'quat_wxyz': expected 4 numbers, found others");
+      section.fail_key("quat_wxyz", "expected 4 numbers, found others");
   if (items.size() != 4 || !(std::abs(quat_wxyz.norm() - 1.0) < 1e-3))
-    section.fail(section.line("quat_wxyz"), "'quat_wxyz': expected a unit quaternion w, x, y, z, found another");
+    section.fail_key("quat_wxyz", "expected a unit quaternion w, x, y, z, found another");
   config.X_BC.R = Eigen::Quaterniond(quat_wxyz[0], quat_wxyz[1], quat_wxyz[2], quat_wxyz[3]).normalized();
   config.has_camera = true;
 }
@@ -111,21 +90,21 @@ RobotConfig parse_robot_config(const std::string& text, const std::string& file)
   const YamlSection top(file, parse_yaml(text, file), "robot",
                         {"schema", "robot", "interface", "domain", "mode_machine", "allow_motion", "twin", "person",
                          "limits", "touches", "contact_limits", "executor", "odometry", "lcm", "camera"});
-  if (const std::string schema = top.text("schema"); schema != kRobotSchema)
-    top.fail(top.line("schema"), fmt::format("'schema': expected '{}', found '{}'", kRobotSchema, schema));
+  top.require_schema(kRobotSchema);
   RobotConfig config;
-  config.permission = {.allow_motion = top.flag_or("allow_motion", false),
+  config.permission = {.allow_motion = false,
                        .robot = top.text("robot"),
                        .interface = top.text("interface"),
                        .domain = whole_number(top, "domain"),
                        .mode_machine = whole_number(top, "mode_machine")};
-  config.twin = top.flag_or("twin", false);
-  config.person = top.flag_or("person", true);
-  if (top.has("contact_limits")) config.contact_limits = top.text("contact_limits");
-  if (top.has("limits")) read_limits(file, top.node("limits"), config.limits);
+  read_optional(top, {"allow_motion"}, config.permission.allow_motion);
+  read_optional(top, {"twin"}, config.twin);
+  read_optional(top, {"person"}, config.person);
+  read_optional(top, {"contact_limits"}, config.contact_limits);
+  if (top.has("limits")) read_fields(file, top.node("limits"), "limits", hardware_limit_fields(), config.limits);
   read_touches(top, config.touches);
   read_executor(top, config);
-  if (top.has("lcm")) read_lcm(file, top.node("lcm"), config.lcm);
+  if (top.has("lcm")) read_mapping(file, top.node("lcm"), "lcm", lcm_schema(), config.lcm);
   if (top.has("camera")) read_camera(file, top.node("camera"), config);
   try {
     config.twin ? check_twin_place(config.place()) : check_place(config.place());

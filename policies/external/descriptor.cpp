@@ -45,23 +45,20 @@ constexpr const char* kSchema = "duet.policy/1";
 constexpr int kMostAnchors = 1000, kMostTicks = 500;
 constexpr int kMostNoise = 1000000;
 
-void read_schema(const YamlSection& root, PolicyDescriptor&) {
-  if (const std::string schema = root.text("schema"); schema != kSchema)
-    root.fail(root.line("schema"), fmt::format("'schema': expected '{}', found '{}'", kSchema, schema));
-}
+void read_schema(const YamlSection& root, PolicyDescriptor&) { root.require_schema(kSchema); }
 
 void read_joints(const YamlSection& root, PolicyDescriptor& out) {
   read_optional(root, {"joints"}, out.joints);
   out.joints_line = root.line("joints");
   for (auto it = out.joints.begin(); it != out.joints.end(); ++it)
     if (std::find(out.joints.begin(), it, *it) != it)
-      root.fail(out.joints_line, fmt::format("'joints': expected each joint once, found '{}' again", *it));
+      root.fail(out.joints_line, fmt::format("key 'joints': expected each joint once, found '{}' again", *it));
 }
 
 void read_tasks(const YamlSection& root, PolicyDescriptor& out) {
   if (!root.has("tasks")) return;
   out.tasks.clear();
-  const auto fail = [&](const std::string& message) { root.fail(root.line("tasks"), "'tasks': " + message); };
+  const auto fail = [&](const std::string& message) { root.fail_key("tasks", message); };
   std::vector<std::string> names;
   read_value(root, {"tasks"}, names);
   for (const std::string& name : names) {
@@ -77,11 +74,12 @@ void read_tasks(const YamlSection& root, PolicyDescriptor& out) {
 }
 
 void read_spacing(const YamlSection& s, PlanFormat& output) {
-  const double spacing = s.optional_number("spacing").value_or(kAnchorSpacing);
+  double spacing = kAnchorSpacing;
+  read_optional(s, {"spacing"}, spacing);
   const double ticks = std::round(spacing / kTick);
   if (std::abs(ticks * kTick - spacing) > 1e-9 || ticks < 1 || ticks > kMostTicks)
-    s.fail(s.line("spacing"), fmt::format("'spacing': expected a multiple of {} s in [{}, {}], found {}", kTick, kTick,
-                                          kMostTicks * kTick, spacing));
+    s.fail_key("spacing", fmt::format("expected a multiple of {} s in [{}, {}], found {}", kTick, kTick,
+                                      kMostTicks * kTick, spacing));
   output.ticks_per_anchor = static_cast<int>(ticks);
 }
 
@@ -157,9 +155,9 @@ class DescriptorReader {
     refuse_keys({"command", "socket", "deadline_ms", "hang_ms", "start_ms"}, "onnx");
     out_.network = root_.text("network");
     if (out_.joints.empty())
-      root_.fail(out_.joints_line, "'joints': expected the joints in the network's order, found none");
+      root_.fail(out_.joints_line, "key 'joints': expected the joints in the network's order, found none");
     for (const YAML::Node& node : root_.items("inputs")) out_.inputs.push_back(read_input(node));
-    if (out_.inputs.empty()) root_.fail(root_.line("inputs"), "'inputs': expected at least one, found none");
+    if (out_.inputs.empty()) root_.fail_key("inputs", "expected at least one, found none");
   }
 
   [[nodiscard]] PolicyInput read_input(const YAML::Node& node) const {
@@ -173,7 +171,7 @@ class DescriptorReader {
          }}};
     PolicyInput input;
     const YamlSection s = read_mapping(out_.file, node, "input", schema, input);
-    if (input.channels.empty()) s.fail(s.line("channels"), "'channels': expected at least one, found none");
+    if (input.channels.empty()) s.fail_key("channels", "expected at least one, found none");
     for (const Channel& channel : input.channels)
       if (input.frames > 1 && !is_of_a_frame(channel.kind))
         s.fail(channel.line, fmt::format("channel '{}': expected in an input of 1 frame, found in one of {}",
@@ -227,7 +225,7 @@ class DescriptorReader {
     read_numbers(s, key, values);
     const int size = channel_size(channel, {.joints = static_cast<int>(out_.joints.size()), .actions = 0});
     if (values.size() != 1 && static_cast<int>(values.size()) != size)
-      s.fail(s.line(key), fmt::format("'{}': expected 1 or {} numbers, found {}", key, size, values.size()));
+      s.fail_key(key, fmt::format("expected 1 or {} numbers, found {}", size, values.size()));
   }
 
   void read_process() {

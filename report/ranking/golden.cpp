@@ -46,23 +46,39 @@ std::map<std::string, GoldenFigure> figures_of(const LeaderboardEntry& entry) {
   return figures;
 }
 
-std::map<std::string, GoldenFigure> read_figures(const nlohmann::json& json, const std::string& where) {
-  if (!json.is_object())
-    throw InputError(fmt::format("{}: expected an object of figures, found {}", where, json.type_name()));
-  std::map<std::string, GoldenFigure> figures;
-  for (const auto& [name, value] : json.items()) {
-    JsonFields fields(value, fmt::format("{}: {}", where, name));
-    const GoldenFigure figure{
-        .value = fields.number("value"), .atol = fields.number("atol"), .rtol = fields.number("rtol")};
-    fields.refuse_unknown();
-    if (figure.atol < 0.0 || figure.rtol < 0.0) {
-      throw InputError(fmt::format("{}: {}: expected tolerances of at least 0, found atol {}, rtol {}", where, name,
-                                   figure.atol, figure.rtol));
-    }
-    figures[name] = figure;
-  }
-  return figures;
+using GoldenEntries = std::map<std::string, std::map<std::string, GoldenFigure>>;
+
+struct Baseline {
+  RunInfo run;
+  GoldenEntries entries;
+};
+
+}  // namespace
+
+template <>
+const JsonSchema<GoldenFigure>& json_schema<GoldenFigure>() {
+  using F = GoldenFigure;
+  static const JsonSchema<F> schema = {{finite_key("value"), &F::value},
+                                       {{.name = "atol", .range = {.low = 0.0}}, &F::atol},
+                                       {{.name = "rtol", .range = {.low = 0.0}}, &F::rtol}};
+  return schema;
 }
+
+template <>
+const JsonSchema<Baseline>& json_schema<Baseline>() {
+  using I = RunInfo;
+  static const JsonSchema<Baseline> schema = [] {
+    JsonSchema<Baseline> keys = json_keys<Baseline, I>(&Baseline::run, {{{"suite"}, &I::suite},
+                                                                        {{"suite_version"}, &I::suite_version},
+                                                                        {{"suite_hash"}, &I::suite_hash},
+                                                                        {{"suite_yaml"}, &I::suite_yaml}});
+    keys.emplace_back(FieldDoc{"entries"}, &Baseline::entries);
+    return keys;
+  }();
+  return schema;
+}
+
+namespace {
 
 // The lines of suite.yaml that the suite hash covers: all but policies, engines and comments.
 std::set<std::string> hashed_lines(const std::string& yaml) {
@@ -98,27 +114,11 @@ void require_suite(const RunInfo& expected, const RunInfo& found, const std::str
                                differing));
 }
 
-std::map<std::string, std::map<std::string, GoldenFigure>> read_baseline(const std::string& text, const RunInfo& run) {
+GoldenEntries read_baseline(const std::string& text, const RunInfo& run) {
   const std::string what = "golden baseline";
-  const nlohmann::json json = parse_json(text, what);
-  JsonFields fields(json, what);
-  if (const std::string schema = fields.text("schema"); schema != kGoldenSchema) {
-    throw InputError(fmt::format("{}: expected schema {}, found {}", what, kGoldenSchema, excerpt(schema)));
-  }
-  RunInfo blessed;
-  blessed.suite = fields.text("suite");
-  blessed.suite_version = fields.text("suite_version");
-  blessed.suite_hash = fields.text("suite_hash");
-  blessed.suite_yaml = fields.text("suite_yaml");
-  require_suite(blessed, run, what);
-  const nlohmann::json& entries = fields.at("entries");
-  fields.refuse_unknown();
-  if (!entries.is_object()) throw InputError(fmt::format("{}: key 'entries': expected an object", what));
-  std::map<std::string, std::map<std::string, GoldenFigure>> baseline;
-  for (const auto& [where, figures] : entries.items()) {
-    baseline[where] = read_figures(figures, fmt::format("{}: {}", what, where));
-  }
-  return baseline;
+  auto baseline = read_document<Baseline>(text, what, kGoldenSchema);
+  require_suite(baseline.run, run, what);
+  return std::move(baseline.entries);
 }
 
 // Shortens "mujoco/vmc/replay clean hug" part by part to the names of what may be missing as a whole.
@@ -129,8 +129,7 @@ std::string policy_of(const std::string& where) {
 std::string combination_of(const std::string& where) { return where.substr(0, where.rfind(' ')); }
 
 // The part of the run that is missing: a whole policy, its combination with an engine and a controller, or a task.
-std::string missing_part(const std::string& where,
-                         const std::map<std::string, std::map<std::string, GoldenFigure>>& found) {
+std::string missing_part(const std::string& where, const GoldenEntries& found) {
   const auto has = [&](const auto& name_of, const std::string& name) {
     return std::ranges::any_of(found, [&](const auto& entry) { return name_of(entry.first) == name; });
   };
@@ -157,22 +156,14 @@ void add_missing(const std::string& part, std::size_t figures, std::vector<Golde
 }  // namespace
 
 std::string bless(const std::vector<LeaderboardEntry>& entries, const RunInfo& run) {
-  nlohmann::json list = nlohmann::json::object();
-  for (const LeaderboardEntry& entry : entries) {
-    nlohmann::json& figures = list[place(entry)];
-    for (const auto& [name, figure] : figures_of(entry)) {
-      figures[name] = {{"value", figure.value}, {"atol", figure.atol}, {"rtol", figure.rtol}};
-    }
-  }
-  const nlohmann::json json = {
-      {"schema", kGoldenSchema},      {"suite", run.suite},           {"suite_version", run.suite_version},
-      {"suite_hash", run.suite_hash}, {"suite_yaml", run.suite_yaml}, {"entries", std::move(list)}};
-  return dumped(json, 2) + "\n";
+  Baseline baseline{run, {}};
+  for (const LeaderboardEntry& entry : entries) baseline.entries[place(entry)] = figures_of(entry);
+  return dumped(json_document(kGoldenSchema, baseline), 2) + "\n";
 }
 
 std::vector<GoldenDifference> check(const std::string& golden_json, const std::vector<LeaderboardEntry>& entries,
                                     const RunInfo& run_info) {
-  std::map<std::string, std::map<std::string, GoldenFigure>> found;
+  GoldenEntries found;
   for (const LeaderboardEntry& entry : entries) found[place(entry)] = figures_of(entry);
   std::vector<GoldenDifference> differences;
   for (const auto& [where, figures] : read_baseline(golden_json, run_info)) {

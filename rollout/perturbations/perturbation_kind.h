@@ -55,7 +55,7 @@ PerturbationKind plain_kind(const Field<Perturbation>& value, const std::string&
 // `named`'s.
 template <typename Plan>
 Plan read_plan(const SchemaSection& item, const std::string& name, const FieldTable<Plan>& table, const Plan& named) {
-  const YamlSection mapping(item.file, item.node(name.c_str()), name, field_keys(table));
+  const YamlSection mapping(item.file, item.node(name.c_str()), name, key_names(table));
   Plan plan = mapping.keys().size() > 0 ? named : Plan();
   read_fields(mapping, table, plan);
   return plan;

@@ -276,7 +276,7 @@ Perturbation read_item(const YamlSection& suite, const YAML::Node& node, const s
     try {
       return default_perturbation(node.Scalar());
     } catch (const std::invalid_argument& error) {
-      suite.fail(line, fmt::format("perturbations: {}", error.what()));
+      suite.fail(line, fmt::format("key 'perturbations': {}", error.what()));
     }
   }
   const SchemaSection item(file, node, "perturbation", keys_of_item());
@@ -286,9 +286,8 @@ Perturbation read_item(const YamlSection& suite, const YAML::Node& node, const s
   Perturbation perturbation = read_kinds(item);
   perturbation.tags = read_tags(item, kOfPerturbation);
   perturbation.name = item.has("name") ? item.text("name") : fmt::format("{}", fmt::join(named, "+"));
-  if (perturbation.name == kCleanName) item.fail(item.line("name"), "name: 'clean' is the arm without a perturbation");
-  if (!is_plain_name(perturbation.name))
-    item.fail(item.line("name"), fmt::format("name: {}", plain_name_message(perturbation.name)));
+  if (perturbation.name == kCleanName) item.fail_key("name", "'clean' is the arm without a perturbation");
+  if (!is_plain_name(perturbation.name)) item.fail_key("name", plain_name_message(perturbation.name));
   return perturbation;
 }
 
@@ -325,9 +324,9 @@ std::vector<Perturbation> read_perturbations(const YamlSection& suite, const std
     const auto same = [&](const Perturbation& other) { return other.name == list.back().name; };
     if (std::count_if(list.begin(), list.end(), same) > 1)
       suite.fail(std::max(node.Mark().line, 0) + 1,
-                 fmt::format("perturbations: '{}' is there twice; names tell rows apart", list.back().name));
+                 fmt::format("key 'perturbations': '{}' is there twice; names tell rows apart", list.back().name));
   }
-  if (list.empty()) suite.fail(suite.line("perturbations"), "perturbations: expected at least one, found none");
+  if (list.empty()) suite.fail_key("perturbations", "expected at least one, found none");
   return list;
 }
 

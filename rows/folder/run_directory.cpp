@@ -295,7 +295,7 @@ std::string lean_rows(const Run& run) {
   std::string text;
   for (EpisodeRow row : run.rows) {
     for (const RowField& field : row_fields())
-      if (field.use.heavy) std::visit([&](auto member) { row.*member = {}; }, field.json.member);
+      if (field.use.heavy) field.clear(row);
     text += dumped(to_json(row)) + "\n";
   }
   return text;
@@ -318,7 +318,7 @@ std::string without_places(std::string text) {
 nlohmann::json description_of(const Run& run) {
   nlohmann::json without = nlohmann::json::array();
   for (const RowField& field : row_fields())
-    if (field.use.heavy) without.push_back(field.json.name);
+    if (field.use.heavy) without.push_back(field.name);
   return {{"suite", run.info.suite},
           {"suite_version", run.info.suite_version},
           {"suite_hash", run.info.suite_hash},

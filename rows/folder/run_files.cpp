@@ -129,14 +129,11 @@ bool is_published(const std::string& folder) { return std::filesystem::exists(fi
 void check_published(const std::string& folder) {
   if (!is_published(folder)) return;
   const std::string path = file_of(folder, kManifest);
-  const nlohmann::json json = parse_json(read_text(path), path);
-  JsonFields fields(json, path);
-  if (const std::string schema = fields.text("schema"); schema != kPublishedSchema)
-    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kPublishedSchema, excerpt(schema)));
-  const nlohmann::json& files = fields.at("files");
-  if (!files.is_object() || !files.contains(kPublishedRows))
+  const nlohmann::json json = parse_document(read_text(path), path, kPublishedSchema);
+  const auto files = json_at<std::map<std::string, std::string>>(JsonNode(json, path), "files");
+  if (!files.contains(kPublishedRows))
     throw InputError(fmt::format("{}: key 'files': expected the SHA-256 of {} and others", path, kPublishedRows));
-  for (const auto& [name, digest] : files.items()) {
+  for (const auto& [name, digest] : files) {
     if (!stays_below(name))
       throw InputError(
           fmt::format("{}: key 'files': expected names of files in the folder, found '{}'", path, excerpt(name)));
@@ -144,7 +141,7 @@ void check_published(const std::string& folder) {
     const std::string found = sha256_file(file_of(folder, name));
     if (digest != found)
       throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: not what was published", file_of(folder, name),
-                                   excerpt(dumped(digest)), found));
+                                   excerpt(digest), found));
   }
 }
 

@@ -14,8 +14,6 @@
 namespace duet {
 namespace {
 
-using nlohmann::json;
-
 constexpr std::string_view kRunSchema = "duet.run/1";
 
 using Names = std::vector<std::string>;
@@ -26,68 +24,39 @@ constexpr std::array<std::pair<const char*, Names EpisodeFilter::*>, 5> kPartKey
      {"tasks", &EpisodeFilter::tasks},
      {"perturbations", &EpisodeFilter::perturbations}}};
 
-json to_json(const EpisodeFilter& part) {
-  json object = json::object();
-  for (const auto& [key, names] : kPartKeys)
-    if (!(part.*names).empty()) object[key] = part.*names;
-  return object;
-}
-
-json to_json(const RunPlan& plan) {
-  json parts = json::array();
-  for (const EpisodeFilter& part : plan.parts) parts.push_back(to_json(part));
-  return {{"episodes", plan.episodes}, {"asked", plan.asked}, {"parts", std::move(parts)}};
-}
-
-Names read_names(JsonFields& fields, const std::string& key, const std::string& what) {
-  const json& list = fields.at(key);
-  Names names;
-  if (!list.is_array()) throw InputError(fmt::format("{}: key '{}': expected a list", what, key));
-  for (const json& word : list) {
-    if (!word.is_string()) throw InputError(fmt::format("{}: key '{}': expected strings", what, key));
-    names.push_back(word.get<std::string>());
-  }
-  return names;
-}
-
-EpisodeFilter read_part(const json& object, const std::string& what) {
-  JsonFields fields(object, what);
-  EpisodeFilter part;
-  for (const auto& [key, names] : kPartKeys)
-    if (fields.has(key)) part.*names = read_names(fields, key, what);
-  fields.refuse_unknown();
-  return part;
-}
-
-RunPlan read_plan(const json& object, const std::string& path) {
-  const std::string what = path + ": key 'plan'";
-  JsonFields fields(object, what);
-  RunPlan plan;
-  plan.episodes = fields.integer("episodes");
-  plan.asked = fields.integer("asked");
-  const json& parts = fields.at("parts");
-  if (!parts.is_array()) throw InputError(fmt::format("{}: key 'parts': expected a list", what));
-  for (const json& part : parts) plan.parts.push_back(read_part(part, what + ": a part"));
-  fields.refuse_unknown();
-  return plan;
-}
-
-std::map<std::string, std::string> read_digests(JsonFields& fields, const std::string& key, const std::string& path) {
-  const json& digests = fields.at(key);
-  const auto is_text = [](const json& value) { return value.is_string(); };
-  if (!digests.is_object() || !std::all_of(digests.begin(), digests.end(), is_text))
-    throw InputError(fmt::format("{}: key '{}': expected an object of names and digests", path, key));
-  return digests.get<std::map<std::string, std::string>>();
-}
-
-json read_certificate(JsonFields& fields, const std::string& path) {
-  if (!fields.has("certificate")) return nullptr;
-  const json& certificate = fields.at("certificate");
-  if (certificate.is_object()) return certificate;
-  throw InputError(fmt::format("{}: key 'certificate': expected an object, found {}", path, certificate.type_name()));
-}
-
 }  // namespace
+
+template <>
+const JsonSchema<EpisodeFilter>& json_schema<EpisodeFilter>() {
+  static const JsonSchema<EpisodeFilter> schema = [] {
+    JsonSchema<EpisodeFilter> keys;
+    for (const auto& [key, names] : kPartKeys) keys.emplace_back(FieldDoc{.name = key, .optional = true}, names);
+    return keys;
+  }();
+  return schema;
+}
+
+template <>
+const JsonSchema<RunPlan>& json_schema<RunPlan>() {
+  static const JsonSchema<RunPlan> schema = {
+      {{"episodes"}, &RunPlan::episodes}, {{"asked"}, &RunPlan::asked}, {{"parts"}, &RunPlan::parts}};
+  return schema;
+}
+
+template <>
+const JsonSchema<RunInfo>& json_schema<RunInfo>() {
+  using I = RunInfo;
+  static const JsonSchema<I> schema = {{{"suite"}, &I::suite},
+                                       {{"suite_version"}, &I::suite_version},
+                                       {{"suite_hash"}, &I::suite_hash},
+                                       {{"argv"}, &I::argv},
+                                       {{"created_at"}, &I::created_at},
+                                       {{"policies"}, &I::policies},
+                                       {{"controllers"}, &I::controllers},
+                                       {{.name = "certificate", .optional = true}, &I::certificate},
+                                       {{.name = "plan", .optional = true}, &I::plan}};
+  return schema;
+}
 
 std::vector<EpisodeFilter> with_part(std::vector<EpisodeFilter> parts, EpisodeFilter part) {
   for (const auto& [key, member] : kPartKeys) {
@@ -102,39 +71,10 @@ std::vector<EpisodeFilter> with_part(std::vector<EpisodeFilter> parts, EpisodeFi
   return parts;
 }
 
-std::string run_json(const RunInfo& info) {
-  json object = {{"schema", kRunSchema},
-                 {"suite", info.suite},
-                 {"suite_version", info.suite_version},
-                 {"suite_hash", info.suite_hash},
-                 {"argv", info.argv},
-                 {"created_at", info.created_at},
-                 {"policies", info.policies},
-                 {"controllers", info.controllers}};
-  if (!info.certificate.is_null()) object["certificate"] = info.certificate;
-  if (info.plan) object["plan"] = to_json(*info.plan);
-  // An argument may be no valid UTF-8; the run still counts.
-  return dumped(object, 2) + "\n";
-}
+// An argument may be no valid UTF-8; the run still counts.
+std::string run_json(const RunInfo& info) { return dumped(json_document(kRunSchema, info), 2) + "\n"; }
 
-RunInfo read_run_json(const std::string& path) {
-  const json object = parse_json(read_text(path), path);
-  JsonFields fields(object, path);
-  if (const std::string schema = fields.text("schema"); schema != kRunSchema)
-    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kRunSchema, excerpt(schema)));
-  RunInfo info;
-  info.suite = fields.text("suite");
-  info.suite_version = fields.text("suite_version");
-  info.suite_hash = fields.text("suite_hash");
-  info.argv = read_names(fields, "argv", path);
-  info.created_at = fields.text("created_at");
-  info.policies = read_digests(fields, "policies", path);
-  info.controllers = read_digests(fields, "controllers", path);
-  info.certificate = read_certificate(fields, path);
-  if (fields.has("plan")) info.plan = read_plan(fields.at("plan"), path);
-  fields.refuse_unknown();
-  return info;
-}
+RunInfo read_run_json(const std::string& path) { return read_document<RunInfo>(read_text(path), path, kRunSchema); }
 
 std::string suite_label(const std::string& suite, const std::string& version, const std::string& hash) {
   return fmt::format("{}@{} ({})", suite, version, hash.substr(0, 12));

@@ -6,12 +6,10 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <concepts>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
-#include <type_traits>
-#include <variant>
 
 #include "duet/core/require.h"
 #include "duet/rows/episode_row.h"
@@ -45,40 +43,27 @@ CREATE VIEW leaderboard AS
   FROM episodes GROUP BY engine, controller, policy, perturbation, arm, task;
 )sql";
 
-template <typename T, typename... Types>
-concept OneOf = (std::same_as<T, Types> || ...);
-
-template <typename T>
-concept ColumnValue = OneOf<T, std::string, int, long, std::uint64_t, double, bool, std::optional<bool>, Outcome>;
-
-// Calls use(name, value) for each member that is a column; lists and mappings have tables of their own.
-template <RowPart Part, typename Use>
-void each_column(const Part& part, const std::string& prefix, const Use& use) {
-  for (const JsonMember<Part>& known : part_members<Part>())
-    std::visit(
-        [&](auto member) {
-          if constexpr (ColumnValue<std::remove_cvref_t<decltype(part.*member)>>)
-            use(prefix + std::string(known.name), part.*member);
-        },
-        known.member);
+// Calls use(name, column as SQL declares it, value) for each member that is a column; lists and mappings have tables of
+// their own.
+template <JsonMapping Part, typename Use>
+void each_column(const Part& part, const Use& use) {
+  for (const JsonKey<Part>& key : json_schema<Part>())
+    if (!key.column.empty()) use(key.name, key.column, key.write(part));
 }
 
 // Passes on one field of a row: as it is, or as a column for each member.
 template <typename Use>
 void each_column(const RowField& field, const EpisodeRow& row, const Use& use) {
-  const std::string name(field.json.name);
   if (field.use.heavy) return;
   // Also where only the outcome says so.
-  if (name == "fell") return use(name, row.fell || row.outcome == Outcome::kFell);
-  std::visit(
-      [&](auto member) {
-        using Value = std::remove_cvref_t<decltype(row.*member)>;
-        if constexpr (ColumnValue<Value>) use(name, row.*member);
-        if constexpr (RowPart<Value>)
-          each_column(row.*member, (field.use.columns.empty() ? name : std::string(field.use.columns)) + "_", use);
-      },
-      field.json.member);
-  if (name == "success") use("headline", headline_success(row));
+  if (field.name == "fell") return use(field.name, field.column, row.fell || row.outcome == Outcome::kFell);
+  if (!field.column.empty()) use(field.name, field.column, field.write(row));
+  if (field.type == "object") {
+    const std::string prefix(field.use.columns.empty() ? std::string_view(field.name) : field.use.columns);
+    const nlohmann::json part = field.write(row);
+    for (const JsonDoc& member : field.members) use(prefix + "_" + member.name, member.column, part.at(member.name));
+  }
+  if (field.name == "success") use("headline", "INTEGER NOT NULL", headline_success(row));
 }
 
 template <typename Use>
@@ -86,21 +71,11 @@ void each_column(const EpisodeRow& row, const Use& use) {
   for (const RowField& field : row_fields()) each_column(field, row, use);
 }
 
-template <ColumnValue Value>
-constexpr const char* sql_type() {
-  // A seed has 64 bits without a sign, more than SQLite's integers hold.
-  if constexpr (OneOf<Value, std::string, Outcome, std::uint64_t>) return "TEXT NOT NULL";
-  if constexpr (std::same_as<Value, double>) return "REAL";
-  if constexpr (std::same_as<Value, std::optional<bool>>) return "INTEGER";
-  return "INTEGER NOT NULL";
-}
-
 // Columns of a table as SQL declares them, in their order.
 class DeclaredColumns {
  public:
-  template <ColumnValue Value>
-  void operator()(const std::string& name, const Value&) {
-    declared_.push_back(fmt::format("{} {}", name, name == "key" ? "TEXT PRIMARY KEY" : sql_type<Value>()));
+  void operator()(const std::string& name, const std::string& column, const nlohmann::json&) {
+    declared_.push_back(fmt::format("{} {}", name, name == "key" ? "TEXT PRIMARY KEY" : column));
   }
   [[nodiscard]] std::string text() const { return fmt::format("{}", fmt::join(declared_, ", ")); }
 
@@ -111,8 +86,8 @@ class DeclaredColumns {
 std::string schema_sql() {
   DeclaredColumns episodes, contacts, verdicts;
   each_column(EpisodeRow(), std::ref(episodes));
-  each_column(RowContact(), "", std::ref(contacts));
-  each_column(Verdict(), "", std::ref(verdicts));
+  each_column(RowContact(), std::ref(contacts));
+  each_column(Verdict(), std::ref(verdicts));
   return fmt::format("CREATE TABLE episodes ({});", episodes.text()) +
          fmt::format(fmt::runtime(kTables), contacts.text(), verdicts.text());
 }
@@ -179,18 +154,17 @@ class Parameters {
     sqlite3_bind_int64(statement_, ++place_, value);
     return *this;
   }
-  Parameters& add(int value) { return add(std::int64_t{value}); }
-  Parameters& add(bool value) { return add(std::int64_t{value ? 1 : 0}); }
-  Parameters& add(std::uint64_t value) { return add(fmt::format("{}", value)); }
-  Parameters& add(Outcome value) { return add(std::string(to_string(value))); }
   Parameters& add(double value) {  // NULL where it is not finite
     std::isfinite(value) ? sqlite3_bind_double(statement_, ++place_, value) : sqlite3_bind_null(statement_, ++place_);
     return *this;
   }
-  Parameters& add(const std::optional<bool>& value) {
-    value.has_value() ? sqlite3_bind_int(statement_, ++place_, *value ? 1 : 0)
-                      : sqlite3_bind_null(statement_, ++place_);
-    return *this;
+  // The value of a column.
+  Parameters& add(const nlohmann::json& value) {
+    if (value.is_null()) return add(std::numeric_limits<double>::quiet_NaN());
+    if (value.is_string()) return add(value.get_ref<const std::string&>());
+    if (value.is_number_float()) return add(value.get<double>());
+    if (value.is_number_unsigned()) return add(fmt::format("{}", value.get<std::uint64_t>()));
+    return add(value.is_boolean() ? std::int64_t{value.get<bool>()} : value.get<std::int64_t>());
   }
   Parameters& add(const char* value) { return add(std::string(value)); }
 
@@ -226,7 +200,8 @@ class RowWriter {
  private:
   // Adds what a column holds.
   static auto into(Parameters& parameters) {
-    return [&parameters](const std::string&, const auto& value) { parameters.add(value); };
+    return
+        [&parameters](const std::string&, const std::string&, const nlohmann::json& value) { parameters.add(value); };
   }
 
   void write_episode(const EpisodeRow& row) {
@@ -247,8 +222,8 @@ class RowWriter {
     int number = 0;
     for (const RowContact& contact : row.contacts) {
       Parameters parameters(contact_.get());
-      parameters.add(row.key).add(number++);
-      each_column(contact, "", into(parameters));
+      parameters.add(row.key).add(std::int64_t{number++});
+      each_column(contact, into(parameters));
       database_.step(contact_.get());
     }
   }
@@ -256,7 +231,7 @@ class RowWriter {
   void write_verdict(const std::string& key, const Verdict& verdict) {
     Parameters parameters(verdict_.get());
     parameters.add(key);
-    each_column(verdict, "", into(parameters));
+    each_column(verdict, into(parameters));
     database_.step(verdict_.get());
     const auto write = [&](const char* kind, const std::string& name, double value) {
       Parameters(value_.get()).add(key).add(verdict.version).add(verdict.thresholds).add(kind).add(name).add(value);
@@ -296,7 +271,8 @@ void fill(const std::vector<EpisodeRow>& rows, const std::vector<std::string>& n
 
 std::vector<std::string> database_columns(const RowField& field) {
   std::vector<std::string> names;
-  each_column(field, EpisodeRow(), [&](const std::string& name, const auto&) { names.push_back(name); });
+  each_column(field, EpisodeRow(),
+              [&](const std::string& name, const std::string&, const nlohmann::json&) { names.push_back(name); });
   return names;
 }
 
@@ -329,25 +305,11 @@ void write_database(const std::vector<EpisodeRow>& rows, const std::string& path
 
 namespace {
 
-template <typename Owner, typename... More>
-RowFieldInfo described(const JsonMember<Owner, More...>& known) {
+RowFieldInfo described(const JsonDoc& known) {
   const std::string unit = known.unit.empty() ? "" : fmt::format(" [{}]", known.unit);
-  return {std::string(known.name), std::string(member_words(known)), std::string(known.meaning) + unit, {}, {}};
-}
-
-template <RowPart Part>
-std::vector<RowFieldInfo> members_of(ValueType<Part>) {
-  std::vector<RowFieldInfo> members;
-  for (const JsonMember<Part>& known : part_members<Part>()) members.push_back(described(known));
-  return members;
-}
-template <RowPart Part>
-std::vector<RowFieldInfo> members_of(ValueType<std::vector<Part>>) {
-  return members_of(ValueType<Part>());
-}
-template <typename Value>
-std::vector<RowFieldInfo> members_of(ValueType<Value>) {
-  return {};
+  RowFieldInfo info = {known.name, known.type, known.meaning + unit, {}, {}};
+  for (const JsonDoc& member : known.members) info.members.push_back(described(member));
+  return info;
 }
 
 }  // namespace
@@ -356,12 +318,10 @@ std::vector<RowFieldInfo> row_field_list() {
   std::vector<RowFieldInfo> list = {
       {"schema", "integer", fmt::format("{}, the only one that is read", kRowSchema), {}, {}}};
   for (const RowField& field : row_fields()) {
-    RowFieldInfo& info = list.emplace_back(described(field.json));
+    RowFieldInfo& info = list.emplace_back(described(field));
     if (!field.use.repeats) info.meaning += "; differs from run to run";
     if (field.use.heavy) info.meaning += "; null in published rows";
     info.columns = database_columns(field);
-    info.members = std::visit([]<typename Value>(Value EpisodeRow::*) { return members_of(ValueType<Value>()); },
-                              field.json.member);
   }
   return list;
 }

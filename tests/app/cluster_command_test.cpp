@@ -216,7 +216,7 @@ TEST_F(ClusterCommand, ARunMayHaveASpaceAndOtherSignsInItsName) {
   fs::rename(run_, none);
   const Answer refused = duet("submit '" + none + "'");
   EXPECT_EQ(refused.code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("output: expected a text without a backslash"));
+  EXPECT_THAT(refused.err, HasSubstr("'output': expected a text without a backslash"));
 }
 
 TEST_F(ClusterCommand, HintsAreCommandsThatAShellTakes) {
@@ -245,7 +245,7 @@ TEST_F(ClusterCommand, BadInputIsOneSentence) {
   EXPECT_THAT(refusal("status " + (folder_ / "none")), HasSubstr("(no plan.json)"));
   EXPECT_THAT(refusal("submit " + (folder_ / "none")), HasSubstr("(no plan.json)"));
   EXPECT_THAT(refusal("submit " + run_ + " --partition \"$(printf 'a\\nb')\""),
-              HasSubstr("partition: expected one line"));
+              HasSubstr("'partition': expected one line"));
   EXPECT_THAT(refusal("plan " + suite + " -o " + run_), HasSubstr("is planned already"));
   EXPECT_THAT(refusal("plan " + suite + " --shards some -o " + fresh), HasSubstr("--shards: expected 'auto' or"));
   EXPECT_THAT(refusal("plan -q " + suite + " --cost playback/pd=0.01 --shards 2 -o " + fresh),
@@ -302,12 +302,12 @@ TEST_F(TrainingJobs, AListThatIsNoneIsRefused) {
   };
   EXPECT_THAT(refusal("train: wbc", "train: wcb"), HasSubstr("arms.yaml:2: trainings: unknown training 'wcb'"));
   EXPECT_THAT(refusal("seeds: [1, 2]", "seeds: [1, -2]"), HasSubstr("expected whole numbers of at least 0"));
-  EXPECT_THAT(refusal("seeds: [1, 2]", "seeds: []"), HasSubstr("seeds: expected one at least"));
-  EXPECT_THAT(refusal("arms: {plain: [], other: [--card, g1]}", "arms: {}"), HasSubstr("arms: expected a mapping"));
-  EXPECT_THAT(refusal("plain: []", "../plain: []"), HasSubstr("arms: expected names of letters"));
+  EXPECT_THAT(refusal("seeds: [1, 2]", "seeds: []"), HasSubstr("'seeds': expected one at least"));
+  EXPECT_THAT(refusal("arms: {plain: [], other: [--card, g1]}", "arms: {}"), HasSubstr("'arms': expected a mapping"));
+  EXPECT_THAT(refusal("plain: []", "../plain: []"), HasSubstr("'arms': expected names of letters"));
   EXPECT_THAT(refusal("plain: []", "plain: 7"), HasSubstr("arm 'plain': expected a list"));
   EXPECT_THAT(refusal("plain: []", "plain: [[7]]"), HasSubstr("arm 'plain': expected texts"));
-  EXPECT_THAT(refusal("minutes: 0.5", "minutes: -1"), HasSubstr("minutes: expected above 0"));
+  EXPECT_THAT(refusal("minutes: 0.5", "minutes: -1"), HasSubstr("'minutes': expected a number above 0"));
   EXPECT_THAT(refusal("minutes:", "minute:"), HasSubstr("minute"));
   EXPECT_THAT(refusal("'64'", "'6x'"), HasSubstr("option 'steps': expected a whole number"));
   EXPECT_THAT(refusal("--environments", "--seed"), HasSubstr("unknown option of a training 'seed'"));

@@ -349,7 +349,7 @@ TEST(CommandLine, EveryRefusalNamesItsFile) {
     return answer.err;
   };
   EXPECT_EQ(refusal("check -q " + (folder / "hug") + " -b " + (folder / "golden.json")),
-            "duet: " + (folder / "golden.json") + ": golden baseline: key 'suite' is missing\n");
+            "duet: " + (folder / "golden.json") + ": golden baseline: expected the key 'suite', found none\n");
   for (const char* command : {"score -q ", "retarget -q -o x "})
     EXPECT_THAT(refusal(command + (folder / "slow.npz")), HasSubstr("slow.npz': key 'rate_hz': expected 5 Hz or more"));
   EXPECT_THAT(refusal("retarget -q -o x " + clip + " --card " + (folder / "fewer.yaml") + " --urdf " +

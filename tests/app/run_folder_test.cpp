@@ -349,7 +349,7 @@ TEST_F(RunFolder, MistakesOfASuiteAreToldBeforeTheFirstEpisodeAndByADryRun) {
       {"dt: .nan\n", "dt"},
       {"dt: 0.003\n", "that divides 0.02, found 0.003"},
       {"limits: {wall_s_per_episode: .inf}\n", "wall_s_per_episode"},
-      {"episodes_per_clip: 3000000000\n", "episodes_per_clip: expected a whole number, 1 to 2147483647"},
+      {"episodes_per_clip: 3000000000\n", "'episodes_per_clip': expected a whole number, 1 to 2147483647"},
       {"episodes_per_clip: 2000000000\n", "expected at most 10000000 episodes, found 8000000000"}};
   for (const auto& [yaml, names] : cases) {
     write_suite("[wave, handshake]", 1, yaml);

@@ -74,7 +74,7 @@ TEST_F(Simbody, OptionsAreCheckedByNameAndRange) {
   scene.options = {{"sweeps", "0"}};
   EXPECT_NE(test::thrown_message<std::invalid_argument>([&] {
               make_backend("simbody", scene);
-            }).find("simbody: sweeps is '0', expected a whole number from 1 to 10000"),
+            }).find("engine 'simbody': option 'sweeps': expected a whole number, 1 to 10000, found 0"),
             std::string::npos);
   scene.options = {{"contact_stiffness", "soft"}};
   EXPECT_NE(test::thrown_message<std::invalid_argument>([&] { make_backend("simbody", scene); }).find("'soft'"),

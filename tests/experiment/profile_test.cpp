@@ -76,7 +76,7 @@ TEST(Profile, TheDigestIsOfWhatHoldsNotOfWhatIsWritten) {
   for (const EngineInfo& engine : engines()) {
     if (!engine.available || engine_module(engine.name).options.empty()) continue;
     const EngineOption& option = engine_module(engine.name).options.front();
-    const EngineSettings silent, written{0.002, {{option.name, option.value}}}, slower{0.004, {}};
+    const EngineSettings silent, written{0.002, {{option.name, option.text({})}}}, slower{0.004, {}};
     EXPECT_EQ(settings_digest(engine.name, silent), settings_digest(engine.name, written));
     EXPECT_NE(settings_digest(engine.name, silent), settings_digest(engine.name, slower));
   }

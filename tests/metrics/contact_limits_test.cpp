@@ -82,17 +82,17 @@ TEST(ContactLimits, BrokenTablesAreRefusedWithFileAndLine) {
 TEST(ContactLimits, RefuseValuesThatAreNoLimits) {
   const std::string where = "l.yaml:7: contact limits of a region: ";
   EXPECT_EQ(error("quasi_static_n: 140", "quasi_static_n: 0"),
-            where + "'quasi_static_n': expected a number > 0, found 0");
-  EXPECT_EQ(error("mass_kg: 40", "mass_kg: -1"), where + "'mass_kg': expected a number > 0, found -1");
+            where + "key 'quasi_static_n': expected a finite number above 0, found 0");
+  EXPECT_EQ(error("mass_kg: 40", "mass_kg: -1"), where + "key 'mass_kg': expected a finite number above 0, found -1");
   EXPECT_EQ(error("stiffness_n_mm: 25", "stiffness_n_mm: soft"),
-            where + "'stiffness_n_mm': expected a finite number, found 'soft'");
+            where + "key 'stiffness_n_mm': expected a finite number above 0, found 'soft'");
   for (const char* wrong : {"never", "-3", ".inf", "0", ".nan"})
     EXPECT_EQ(error("transient_n: 280", std::string("transient_n: ") + wrong),
-              where + "'transient_n': expected a number > 0 or 'not_allowed', found '" + wrong + "'");
+              where + "key 'transient_n': expected a number > 0 or 'not_allowed', found '" + wrong + "'");
   EXPECT_EQ(error("transient_n: 280", "transient_n: 139"),
-            where + "'transient_n': expected at least 'quasi_static_n' = 140, found 139");
+            where + "key 'transient_n': expected at least 'quasi_static_n' = 140, found 139");
   EXPECT_EQ(error("quasi_static_n: 140, transient_n: 280", "transient_n: not_allowed"),
-            where + "'transient_n': 'not_allowed' needs 'quasi_static_n', found none");
+            where + "key 'transient_n': 'not_allowed' needs 'quasi_static_n', found none");
 }
 
 TEST(ContactLimits, AnUnknownRegionIsRefusedByName) {

@@ -67,7 +67,8 @@ TEST_F(CardExtends, GoesOverSeveralCards) {
 TEST_F(CardExtends, AFaultOfTheCardExtendedNamesItsFileAndLine) {
   add("base/broken.yaml", replaced(kSmallCard, "kp: 20", "kp: stiff"));
   EXPECT_EQ(error(add("base/mine.yaml", "name: mine\nextends: broken.yaml\n")),
-            folder_ / "base/broken.yaml" + ":5: joint 'shoulder': 'kp': expected a finite number, found 'stiff'");
+            folder_ / "base/broken.yaml" +
+                ":5: joint 'shoulder': key 'kp': expected a finite number, zero or more, found 'stiff'");
   // A fault that the card itself makes in what it extends is told at the place of the latter.
   EXPECT_SENTENCE(error(add("base/less.yaml", R"(name: less
 extends: small.yaml
@@ -79,7 +80,7 @@ TEST_F(CardExtends, ACycleNamesBothFiles) {
   add("base/a.yaml", "name: a\nextends: b.yaml\n");
   add("base/b.yaml", "name: b\nextends: a.yaml\n");
   EXPECT_EQ(error(folder_ / "base/a.yaml"),
-            folder_ / "base/b.yaml" + ":2: robot card: 'extends': expected cards without a cycle, found " +
+            folder_ / "base/b.yaml" + ":2: robot card: key 'extends': expected cards without a cycle, found " +
                 (folder_ / "base/a.yaml") + ", which extends " + (folder_ / "base/b.yaml"));
   EXPECT_SENTENCE(error(add("base/self.yaml", "name: self\nextends: self.yaml\n")));
 }

@@ -1,6 +1,6 @@
 
 #include "duet/core/require.h"
-#include "duet/robots/yaml_section.h"
+#include "duet/robots/yaml_schema.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -23,7 +23,7 @@ const FieldTable<Lamp>& lamp_fields() {
 
 Lamp read_lamp(const std::string& text) {
   Lamp lamp;
-  const YamlSection section("l.yaml", parse_yaml(text, "l.yaml"), "lamp", field_keys(lamp_fields()));
+  const YamlSection section("l.yaml", parse_yaml(text, "l.yaml"), "lamp", key_names(lamp_fields()));
   read_fields(section, lamp_fields(), lamp);
   return lamp;
 }

@@ -27,17 +27,5 @@ TEST(Yaml, EmptyAndBrokenTextsAreToldApart) {
   EXPECT_SENTENCE(thrown_message<InputError>([] { parse_yaml("a: *nobody\n", "a.yaml"); }));
 }
 
-TEST(InRange, RefusesWhatIsBelowAndWhatIsAboveAndAnEndThatIsLeftOut) {
-  const auto read = [](const char* text, bool with_low) {
-    return in_range(YamlSection("a.yaml", parse_yaml(text, "a.yaml"), "range", {"x"}), "x", 7.0, {1.0, 2.0, with_low});
-  };
-  EXPECT_EQ(read("x: 1.5", true), 1.5);
-  EXPECT_EQ(read("x: 1", true), 1.0);
-  EXPECT_EQ(read("x: 2", false), 2.0);
-  EXPECT_SENTENCE(thrown_message<InputError>([&] { read("x: 0.5", true); }));
-  EXPECT_SENTENCE(thrown_message<InputError>([&] { read("\nx: 2.5", true); }));
-  EXPECT_SENTENCE(thrown_message<InputError>([&] { read("x: 1", false); }));
-}
-
 }  // namespace
 }  // namespace duet

@@ -91,7 +91,7 @@ TEST(Database, ColumnsOfAnEpisodeAreThoseOfTheFields) {
 TEST(Database, AFieldIsAColumnAPartAColumnForEachMemberATraceNone) {
   const auto columns_of = [](std::string_view name) {
     for (const RowField& field : row_fields())
-      if (field.json.name == name) return database_columns(field);
+      if (field.name == name) return database_columns(field);
     return std::vector<std::string>{"no such field"};
   };
   EXPECT_THAT(columns_of("sim_s"), testing::ElementsAre("sim_s"));

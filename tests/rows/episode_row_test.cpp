@@ -90,7 +90,7 @@ TEST(EpisodeRow, NoFieldMayBeAbsentButTags) {
   for (const auto& [key, value] : old.items()) {
     nlohmann::json json = whole;
     json.erase(key);
-    EXPECT_THAT(refusal(json), HasSubstr("key '" + key + "' is missing"));
+    EXPECT_THAT(refusal(json), HasSubstr("expected the key '" + key + "', found none"));
   }
 }
 
@@ -149,7 +149,7 @@ TEST(EpisodeRow, ContactsAreReadStrictly) {
   for (const auto& [key, value] : whole.at("contacts").at(0).items()) {
     nlohmann::json json = whole;
     json["contacts"][0].erase(key);
-    EXPECT_EQ(refusal(json), "episode row: contact 0: key '" + key + "' is missing");
+    EXPECT_EQ(refusal(json), "episode row: contacts[0]: expected the key '" + key + "', found none");
   }
 }
 
@@ -218,12 +218,12 @@ TEST(EpisodeRow, EveryKeyButContactsAndTagsIsNeeded) {
     if (key.starts_with("contacts") || key == "tags") continue;
     nlohmann::json json = whole;
     json.erase(key);
-    EXPECT_EQ(refusal(json), "episode row: key '" + key + "' is missing");
+    EXPECT_EQ(refusal(json), "episode row: expected the key '" + key + "', found none");
   }
   for (const auto& [key, value] : whole.at("verdicts").at(0).items()) {
     nlohmann::json json = whole;
     json["verdicts"][0].erase(key);
-    EXPECT_EQ(refusal(json), "episode row: verdict 0: key '" + key + "' is missing");
+    EXPECT_EQ(refusal(json), "episode row: verdicts[0]: expected the key '" + key + "', found none");
   }
 }
 
