@@ -30,7 +30,8 @@ std::string build_folder() {
 }
 
 // What differs from machine to machine or from run to run: folders of tests, of the build and of the
-// sources, nodes and processes, digests of programs and inputs (not those that a test makes up of one digit).
+// sources, engines that are built beside the benchmark's, nodes and processes, digests of programs and inputs (not
+// those that a test makes up of one digit).
 std::string normalised(std::string text) {
   static const std::string temporary = literally(std::filesystem::temp_directory_path().string());
   static const std::vector<std::pair<std::regex, std::string>> rules = {
@@ -38,6 +39,7 @@ std::string normalised(std::string text) {
       {std::regex(temporary + "/duet-"), "<temp>/duet-"},
       {std::regex(literally(build_folder())), "<build>"},
       {std::regex(literally(kSource)), "<source>"},
+      {std::regex("(mujoco, bullet, ode, simbody, dart)(?:, \\w+)+"), "$1"},
       {std::regex(R"((attempts/\d+)/[\w.-]+-\d+-[0-9a-f]{8}\b)"), "$1/<node, process>"},
       {std::regex(R"(\b(?!([0-9a-f])\1{63})[0-9a-f]{64}\b)"), "<SHA-256>"},
       {std::regex(R"(\b(?!([0-9a-f])\1{11})[0-9a-f]{12}\b)"), "<digest>"}};
