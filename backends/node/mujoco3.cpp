@@ -30,12 +30,30 @@ std::string version() { return engine().engine_version; }
 std::string absence() { return absence_of(engine()); }
 std::unique_ptr<Backend> make(const Scene& scene) { return make_node_backend(engine(), scene, mujoco3_options()); }
 
+constexpr std::string_view kPushesApart =
+    "The friction cone is convex: slip adds to the normal force, and friction grows with it. The ratio of both holds.";
+
 constexpr std::array kDeviations = {
     EngineDeviation{.scene = "incline",
                     .quantity = "acceleration of sliding",
                     .reason = "The friction cone is convex: a contact that slides also pushes the bodies apart, the "
                               "sledge hops down the slope. Slip angle and creep hold.",
                     .bound = 0.45},
+    EngineDeviation{.scene = "skin-rub", .quantity = "normal force", .reason = kPushesApart, .bound = 1.8},
+    EngineDeviation{.scene = "skin-rub",
+                    .quantity = "force across the slip, friction 0.6, limb slides on the diagonal",
+                    .reason = kPushesApart,
+                    .bound = 2.5},
+    EngineDeviation{.scene = "skin-rub",
+                    .quantity = "torque of the shoulder, friction 0.3, limb slides to the left",
+                    .reason = kPushesApart,
+                    .bound = 5.0},
+    EngineDeviation{.scene = "skin-rub",
+                    .quantity = "torque of the shoulder, friction 0.6, limb slides on the diagonal",
+                    .reason = kPushesApart,
+                    .bound = 13.5},
+    EngineDeviation{.scene = "self-rub", .quantity = "normal force", .reason = kPushesApart, .bound = 0.06},
+    EngineDeviation{.scene = "self-rub", .quantity = "slowing of the thigh", .reason = kPushesApart, .bound = 0.06},
 };
 
 const EngineModule kModule = {.name = "mujoco3",

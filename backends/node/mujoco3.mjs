@@ -9,6 +9,7 @@ const [GROUND, HUMAN, ROBOT] = [0, 1, 2]; // duet's ContactSide
 const KINDS = {sphere: 'sphere', capsule: 'capsule'};
 const CONTACTS = 64; // more than a robot touches with at once
 const FAR_AWAY = 1000; // [m], where capsules wait until the partner is there
+const LONGEST = 1; // [m], half length: MuJoCo's broad phase keeps the box of the capsule that it has compiled
 const IMPEDANCE = '0.95 0.99 0.001'; // of the ground and of the robot itself
 const LEAST_MASS = 1e-9; // [kg], of a skin without spring and damper
 const FASTEST = 1e4; // [m/s], [rad/s]: beyond it a step has diverged
@@ -47,7 +48,7 @@ export function mjcf(scene) {
   const {options} = scene;
   const capsules = scene.capsules.map((capsule, i) =>
     `<body name='h${i}' mocap='true' pos='${i} 0 ${FAR_AWAY}'><geom name='h${i}' type='capsule' ` +
-    `size='${capsule.radius} 0.1' contype='1' conaffinity='0' condim='3' priority='0'/></body>`);
+    `size='${capsule.radius} ${LONGEST}' contype='1' conaffinity='0' condim='3' priority='0'/></body>`);
   return '<mujoco><compiler angle=\'radian\' inertiafromgeom=\'false\' boundmass=\'0\' boundinertia=\'0\' ' +
       'balanceinertia=\'false\'/><size memory=\'8M\'/>' +
       `<option timestep='${scene.dt}' gravity='${text(scene.gravity)}' integrator='Euler' ` +
