@@ -1,5 +1,5 @@
 // How a robot's joints are driven: the torque law, the share of the card's rotor inertia (armature) that the engine
-// gets, and the physics step. An axis of profiles, suites and perturbations, declared once. docs/engines.md,
+// gets, and the physics step. An axis of profiles, suites and perturbations, declared once. docs/conformance.md,
 // "Actuation". Functions are pure.
 #pragma once
 

@@ -22,7 +22,7 @@ TEST(FrameHistory, IsOldestFirstFromZeros) {
   FrameHistory history(2, {.frames = 3});
   EXPECT_EQ(history.size(), 6);
   EXPECT_THAT(shown(history, 4), ElementsAre(ElementsAre(0, 0, 0, 0, 1, 10), ElementsAre(0, 0, 1, 10, 2, 20),
-                                               ElementsAre(1, 10, 2, 20, 3, 30), ElementsAre(2, 20, 3, 30, 4, 40)));
+                                             ElementsAre(1, 10, 2, 20, 3, 30), ElementsAre(2, 20, 3, 30, 4, 40)));
 }
 
 TEST(FrameHistory, MayBeginWithItsFirstFrameRepeated) {
