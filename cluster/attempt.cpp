@@ -54,7 +54,10 @@ const JsonSchema<AttemptHeader>& json_schema<AttemptHeader>() {
                                        {{"pid"}, &H::pid},
                                        {{"plan"}, &H::plan},
                                        {{"started_at"}, &H::started_at},
-                                       {{"environment"}, &H::environment}};
+                                       {{"environment"},
+                                        "object or null",
+                                        [](const H& header) { return header.environment; },
+                                        [](const JsonNode& node, H& header) { header.environment = node.value(); }}};
   return schema;
 }
 

@@ -72,7 +72,15 @@ Profile profile_with(const std::string& name, const std::map<std::string, Settin
     for (const auto& [key, value] : settings)
       if (value) document["engines"][engine][key] = *value;
   }
-  return read_profile(parse_yaml(YAML::Dump(document), file), file);
+  const std::string text = YAML::Dump(document);
+  try {
+    return read_profile(parse_yaml(text, file), file);
+  } catch (const InputError& error) {  // nobody wrote these lines: the number of one says nothing
+    std::string said = error.what();
+    if (said.starts_with(file + ':'))
+      said.erase(file.size(), said.find_first_not_of("0123456789", file.size() + 1) - file.size());
+    throw InputError(said);
+  }
 }
 
 struct InlineSetting {

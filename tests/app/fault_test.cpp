@@ -232,7 +232,8 @@ TEST_F(Faults, ARunWithNoControllerAtAllIsRefused) {
 TEST_F(Faults, ANetworkIsForAControllerOfTheSuiteThatHasOne) {
   const std::string run_it = "run " + suite("playback", "none", std::string("pd, ") + kLost) + " --dry-run --network ";
   EXPECT_THAT(run(run_it + "lost=elsewhere.onnx").text, HasSubstr("/elsewhere.onnx"));
-  EXPECT_THAT(run(run_it + "pd=x.onnx").text, HasSubstr("controller 'pd': expected no option, found 'network'"));
+  EXPECT_THAT(run(run_it + "pd=x.onnx").text,
+              HasSubstr("controller 'pd': unknown option 'network'. Known: explicit_step"));
   EXPECT_THAT(run(run_it + "losst=x.onnx").text, HasSubstr("did you mean 'lost'"));
   EXPECT_EQ(run(run_it + "lost").code, 2);
 }

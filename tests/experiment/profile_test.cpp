@@ -99,7 +99,7 @@ TEST(Profile, ALawOrAnArmatureThatCannotBeIsRefused) {
   EXPECT_THAT(refusal("name: p\nengines:\n  ode: {law: implict}\n"),
               AllOf(HasSubstr("p.yaml:3"), HasSubstr("ode: "), HasSubstr("'implict'"), HasSubstr("'implicit'")));
   EXPECT_THAT(refusal("name: p\nengines:\n  ode: {armature: 2}\n"),
-              AllOf(HasSubstr("armature: expected"), HasSubstr("found 2")));
+              AllOf(HasSubstr("key 'armature': expected"), HasSubstr("found 2")));
 }
 
 TEST(Profile, LawAndArmatureOfASuiteAreThoseOfAllItsEngines) {
