@@ -188,13 +188,13 @@ class Trials:
         return ''
 
     def rooms_for(self, path):
-        """The file's room first, then each room whose tests link it, hold it in an engine or in the program."""
+        """The file's room first where it has tests, then each whose tests link it, hold it in an engine or in the program."""
         own = path.split('/')[0]
         held_by_engine = any(self.build.holds(engine, path) for engine in self.build.engines)
         above = [room for room, program in self.build.programs.items() if room != own and (
             self.build.holds(program, path) or
             (held_by_engine and 'libduet_backends.a' in self.build.links[program]))]
-        return [own] + above
+        return [own] * (own in self.build.programs) + above
 
     def noticed(self, folder, changed, rooms):
         """Which test of these rooms notices first, '' where none does."""
