@@ -16,7 +16,7 @@ OPERATORS = [(r' < ', ' <= '), (r' <= ', ' < '), (r' > ', ' >= '), (r' >= ', ' >
              (r'std::min\(', 'std::max('), (r'\b0\.5\b', '0.6'), (r'return true;', 'return false;'),
              (r'return false;', 'return true;'), (r'if \(!', 'if ('), (r'\[0\]', '[1]')]
 SKIPPED_LINES = ('require(', 'throw ', 'fmt::', '#', 'template', 'for (', 'using ', 'typedef', 'static_assert')
-SKIPPED_FILES = ('app/benchmarks/', '_benchmark.cpp', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp', 'parts/training/train.cpp')
+SKIPPED_FILES = ('app/benchmarks/', '/benchmarks.cpp', '_benchmark.cpp', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp', 'parts/training/train.cpp')
 EQUIVALENT = 'tests/mutants_equivalent.txt'
 OUTPUT = re.compile(r'(?<= -o )\S+')
 

@@ -184,7 +184,7 @@ void register_controller(const ControllerInfo& info, ControllerMaker make) {
 ControllerInfo controller_info(const std::string& name) { return find_entry(name).info(name); }
 
 LoadedFiles controller_files(const std::string& name, const ControllerOptions& options) {
-  return find_entry(name).files(name, options);
+  return find_entry(name).files(name, part_of(options, true));
 }
 
 void check_controller_options(const ControllerInfo& info, const ControllerOptions& options) {

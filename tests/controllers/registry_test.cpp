@@ -122,6 +122,7 @@ TEST(ExplicitStepOption, LowersTheDampingThatWouldShake) {
   ASSERT_FALSE(loaded.notes.empty());
   EXPECT_THAT(loaded.notes.front(), HasSubstr("kd of left_ankle_roll_joint: "));
   EXPECT_TRUE(load_controller("pd", robot, {{"explicit_step", "0"}}).notes.empty());
+  EXPECT_EQ(controller_files("wbc_sim", {{"explicit_step", "0.001"}}).size(), controller_files("wbc_sim").size());
   EXPECT_THAT(thrown_message<std::invalid_argument>([&] {
                 static_cast<void>(load_controller("pd", robot, {{"explicit_step", "soon"}}));
               }),
