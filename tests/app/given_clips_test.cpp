@@ -143,7 +143,7 @@ TEST_F(GivenClips, WrittenOutTheyReadBackToTheSame) {
 
 TEST_F(GivenClips, WhatCannotBeIsRefusedByItsLine) {
   EXPECT_THAT(refusal_of_clips("{synth: {per_task: 1, per_file: 1}}"),
-              AllOf(HasSubstr("g.yaml:4"), HasSubstr("'per_file': expected files")));
+              AllOf(HasSubstr("g.yaml:4"), HasSubstr("per_file: expected files")));
   EXPECT_THAT(refusal_of_clips("{synth: {per_file: 1}}"), HasSubstr("found neither"));
   EXPECT_THAT(refusal_of_clips("{files: given, synth: {per_task: 1}}"), HasSubstr("found both"));
   EXPECT_THAT(refusal_of_clips("{files: givn}"), HasSubstr("expected a list"));
@@ -152,7 +152,7 @@ TEST_F(GivenClips, WhatCannotBeIsRefusedByItsLine) {
   EXPECT_THAT(refusal_of_clips("{files: given, roles: all}"), HasSubstr("'all'"));
   EXPECT_THAT(refusal_of_clips("{files: given, synth: {per_file: 1, tracked: 3}}"), HasSubstr("'tracked': expected"));
   EXPECT_THAT(refusal_of_clips("{files: given, synth: {variants: [{name: a, side: left}]}}"),
-              HasSubstr("'variants': expected per_task"));
+              HasSubstr("variants: expected per_task"));
 }
 
 // People stand beside robots in one folder, under the same ids.

@@ -67,14 +67,14 @@ TEST(WalkSuite, WhatHasNoMeaningBesideACommandIsRefusedByItsLine) {
   EXPECT_THAT(refusal("{velocity: [0, 0, 0], seconds: 0}"), HasSubstr("'seconds': expected a number from 0.2"));
   EXPECT_THAT(refusal("{velocity: [0, 0, 0], begin: 3, end: 2}"), HasSubstr("'end': expected a number from 3"));
   EXPECT_THAT(refusal("{velocity: [0, 0, 0], upper_body: dancing}"),
-              HasSubstr("expected 'still', 'held' or 'moving', found 'dancing'"));
+              HasSubstr("unknown upper_body 'dancing'. Known: still, held, moving"));
   EXPECT_THAT(refusal("[{velocity: [0, 0, 0]}, {velocity: [0, 0, 0]}]"), HasSubstr("'stand' is there twice"));
   EXPECT_THAT(refusal("[]"), HasSubstr("expected at least one, found none"));
   EXPECT_THAT(refusal("{velocity: [0, 0, 0]}", "engines: [playback]\ncontrollers: [pd]\npolicies: [replay]\n"),
               ::testing::AllOf(HasSubstr("w.yaml:7"), HasSubstr("policies: expected no such key beside `reference`")));
   EXPECT_THAT(
       refusal("{velocity: [0, 0, 0]}", "engines: [playback]\ncontrollers: [pd]\nclips: {synth: {per_task: 1}}\n"),
-      HasSubstr("'clips': expected no such key"));
+      HasSubstr("clips: expected no such key"));
   EXPECT_THAT(refusal("{velocity: [0.1, 0, 0], begin: 1}", "engines: [playback]\ncontrollers: [homie]\n"),
               HasSubstr("controller 'homie' takes one velocity for the whole episode"));
 }
