@@ -65,7 +65,7 @@ std::string installed_version(const std::string& folder, const NodeEngine& engin
   return version->get<std::string>();
 }
 
-// What `node --version` prints, "v20.20.2"; "" where that is nothing.
+// The line that `node --version` prints, "v20.20.2"; "" where it prints none.
 std::string node_version(const std::string& node) {
   std::string command = "'";
   for (const char c : node) command += c == '\'' ? std::string("'\\''") : std::string(1, c);

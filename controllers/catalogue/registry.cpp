@@ -23,7 +23,7 @@ namespace {
 
 using Robot = std::shared_ptr<const RobotModel>;
 
-// What every controller takes beside its own options.
+// Options of every controller beside its own.
 struct CommonOptions {
   double explicit_step = 0.0;  // 0: as the controller has it
 };

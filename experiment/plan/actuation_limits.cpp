@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "duet/backends/actuation.h"
 #include "duet/rows/episode_row.h"
@@ -59,12 +60,14 @@ std::string to_text(const ActuationLimits& limits) {
 std::vector<std::string> actuation_notes(const Suite& suite, const std::string& controller,
                                          const std::shared_ptr<const RobotModel>& robot, const JointGains& gains) {
   std::vector<std::string> notes;
+  std::map<double, ExplicitStep> steps;  // by armature
   for (const Perturbation& perturbation : suite.perturbations)
     for (const std::string& engine : suite.engines) {
       if (engine == kPlaybackEngine) continue;
       const EngineSettings settings = settings_under(perturbation, suite.profile.settings(engine));
       if (settings.law != TorqueLaw::kExplicit) continue;
-      const ExplicitStep step = step_with(robot, gains, settings.armature);
+      if (!steps.contains(settings.armature)) steps[settings.armature] = step_with(robot, gains, settings.armature);
+      const ExplicitStep& step = steps[settings.armature];
       if (settings.dt <= step.largest) continue;
       std::string note = fmt::format(
           "controller '{}', arm '{}': the explicit law at {:g} ms {} shakes {} of {} whatever the policy does; below "

@@ -90,9 +90,8 @@ struct InlineSetting {
 // "law=explicit,mujoco.cone=pyramidal".
 std::vector<InlineSetting> inline_settings(const std::string& text, const std::string& option) {
   std::vector<InlineSetting> list;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string item = text.substr(begin, end - begin);
+  for (const std::string_view part : split(text, ',')) {
+    const std::string item(part);
     const std::size_t equals = item.find('=');
     require(equals != std::string::npos && equals > 0 && equals + 1 < item.size(),
             "{}: expected KEY=VALUE between commas, found '{}'", option, excerpt(item));
@@ -100,7 +99,6 @@ std::vector<InlineSetting> inline_settings(const std::string& text, const std::s
     const std::size_t dot = key.find('.');
     list.push_back({dot == std::string::npos ? "" : key.substr(0, dot),
                     dot == std::string::npos ? key : key.substr(dot + 1), item.substr(equals + 1)});
-    begin = end + 1;
   }
   return list;
 }

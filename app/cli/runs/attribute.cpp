@@ -36,11 +36,7 @@ std::map<std::string, std::string> names_of_keys(const std::vector<std::string>&
   for (const std::string& group : groups) {
     const auto [name, keys] = split_assignment(group);
     require(is_plain_name(name), "--group {}: {}", excerpt(group), plain_name_message(name));
-    for (std::size_t begin = 0; begin < keys.size();) {
-      const std::size_t end = std::min(keys.find(',', begin), keys.size());
-      names[keys.substr(begin, end - begin)] = name;
-      begin = end + 1;
-    }
+    for (const std::string_view key : split(keys, ',')) names[std::string(key)] = name;
   }
   return names;
 }
