@@ -18,7 +18,7 @@ namespace duet {
 // Throws std::invalid_argument unless the step [s] divides the control period of 0.02 s.
 void check_step(double dt);
 
-// What a value of `dt` may be, for a sentence.
+// The values that `dt` may have, for a sentence.
 std::string step_values();
 
 // "" for a step that check_step takes, else step_values().

@@ -29,7 +29,7 @@ struct HostProgram {
   [[nodiscard]] bool operator==(const HostProgram&) const = default;
 };
 
-// What a host says of a scene that it has taken.
+// The answer of a host that has taken a scene.
 struct HostFacts {
   std::string version;  // of the engine
   int memory = 0;       // numbers that a step needs of the one before it, beyond the state
