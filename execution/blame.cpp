@@ -16,6 +16,7 @@
 #include "duet/rollout/act_episode.h"
 #include "duet/rows/groups/row_groups.h"
 #include "duet/rows/json_fields.h"
+#include "duet/statistics/statistics.h"
 
 namespace duet {
 namespace {
@@ -131,20 +132,40 @@ std::vector<RestartInstant> restarts_of(const EpisodeRuns& runs, const Recording
   return instants;
 }
 
+Restarts of_own(const RestartInstant& instant, const std::string& own) {
+  const auto found = instant.engines.find(own);
+  return found == instant.engines.end() ? Restarts{} : found->second;
+}
+
 // Over all restarts in engines but `own`.
-double share_of_others(const RestartInstant& instant, const std::string& own) {
+Restarts of_others(const RestartInstant& instant, const std::string& own) {
   Restarts others;
   for (const auto& [engine, of] : instant.engines) {
     if (engine == own) continue;
     others.failed += of.failed;
     others.ran += of.ran;
   }
-  return others.share();
+  return others;
 }
 
-double own_share(const RestartInstant& instant, const std::string& own) {
-  const auto found = instant.engines.find(own);
-  return found == instant.engines.end() ? std::numeric_limits<double>::quiet_NaN() : found->second.share();
+double own_share(const RestartInstant& instant, const std::string& own) { return of_own(instant, own).share(); }
+double share_of_others(const RestartInstant& instant, const std::string& own) {
+  return of_others(instant, own).share();
+}
+
+// The p-value that restarts fail in `own` no more often than in the others, over all states from which the others can
+// still succeed.
+double own_engine_p(const std::vector<RestartInstant>& instants, const std::string& own) {
+  Restarts mine, others;
+  for (const RestartInstant& instant : instants) {
+    const Restarts theirs = of_others(instant, own), ours = of_own(instant, own);
+    if (!(theirs.share() < kMostly)) continue;
+    mine.failed += ours.failed;
+    mine.ran += ours.ran;
+    others.failed += theirs.failed;
+    others.ran += theirs.ran;
+  }
+  return fisher_exact_greater(mine.failed, mine.ran, others.failed, others.ran);
 }
 
 bool all_fail(const RestartInstant& instant) {
@@ -187,9 +208,10 @@ Culprit culprit_of(const std::vector<RestartInstant>& instants, const std::strin
   if (!instants.empty() && share_of_others(instants.front(), own) >= kMostly) return Culprit::kPolicy;
   for (const RestartInstant& instant : instants) {
     if (!(own_share(instant, own) >= kMostly)) continue;
-    return share_of_others(instant, own) <= kRarely ? Culprit::kSolver : Culprit::kUnclear;
+    if (share_of_others(instant, own) <= kRarely) return Culprit::kSolver;
+    break;
   }
-  return Culprit::kUnclear;
+  return own_engine_p(instants, own) < kChance ? Culprit::kSolver : Culprit::kUnclear;
 }
 
 Blame blame_episode(const Experiment& experiment, const EpisodeSpec& spec, const BlameOptions& options,
@@ -303,7 +325,9 @@ std::string verdict_text(const Blame& blame) {
       return "The episode succeeds: there is nothing to blame.";
     case Culprit::kSolver:
       return fmt::format(
-          "The solver's: from the same state, under the same policy, it fails in {} and not in the others.", own);
+          "The solver's: from the same states, under the same policy, it fails in {} and not, or far less, in the "
+          "others.",
+          own);
     case Culprit::kPolicy:
       return "The policy's or the controller's: from the start of the episode it fails in the other engines, too.";
     case Culprit::kUnclear:

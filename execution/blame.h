@@ -80,10 +80,12 @@ struct Blame {
 
 // Engines in which a share of restarts fails: at most kRarely of them, at least kMostly.
 inline constexpr double kRarely = 1.0 / 3.0, kMostly = 2.0 / 3.0;
+inline constexpr double kChance = 0.02;  // p below which one engine fails more often than the others
 
 // Whose the failure is, by what the restarts say; `own` is the engine of the episode. The policy's where the others
-// fail from the start of the episode. Else the earliest state from which it comes back in `own` decides: the solver's
-// where the others do not fail from there.
+// fail from the start of the episode. The solver's where, from the earliest state from which it comes back in `own`,
+// the others do not fail; or where it fails in `own` more often than in the others, over all states from which those
+// can still succeed, by Fisher's exact test.
 Culprit culprit_of(const std::vector<RestartInstant>& instants, const std::string& own);
 
 // Runs the episode, and where it fails its restarts. Throws std::invalid_argument for an episode of playback or of a

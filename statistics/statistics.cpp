@@ -165,6 +165,20 @@ double mcnemar_exact(long only_a, long only_b) {
   return std::min(1.0, 2.0 * tail);
 }
 
+double fisher_exact_greater(long k_a, long n_a, long k_b, long n_b) {
+  require(0 <= k_a && k_a <= n_a && 0 <= k_b && k_b <= n_b,
+          "Fisher: expected counts of 0 to their number, found {} of {} and {} of {}", k_a, n_a, k_b, n_b);
+  const long k = k_a + k_b;
+  const auto log_choose = [](long n, long r) {
+    return std::lgamma(static_cast<double>(n) + 1.0) - std::lgamma(static_cast<double>(r) + 1.0) -
+           std::lgamma(static_cast<double>(n - r) + 1.0);
+  };
+  double tail = 0.0;
+  for (long i = k_a; i <= std::min(k, n_a); ++i)
+    if (k - i <= n_b) tail += std::exp(log_choose(n_a, i) + log_choose(n_b, k - i) - log_choose(n_a + n_b, k));
+  return std::min(1.0, tail);
+}
+
 Interval cluster_bootstrap(std::span<const double> values, std::span<const int> cluster, int resamples,
                            std::uint64_t seed, double level) {
   return ClusterBootstrap(resamples, seed).mean(values, cluster, level);

@@ -45,6 +45,10 @@ Interval newcombe_independent(long k_a, long n_a, long k_b, long n_b, double lev
 // Exact two-sided McNemar p-value from the discordant counts.
 double mcnemar_exact(long only_a, long only_b);
 
+// Fisher's exact one-sided p-value: of so many or more of the k_a + k_b among the first n_a, had they fallen on all
+// n_a + n_b alike. 1 where n_a or n_b is 0. Throws std::invalid_argument unless 0 <= k <= n of both.
+double fisher_exact_greater(long k_a, long n_a, long k_b, long n_b);
+
 // Percentile interval of the mean by resampling clusters with replacement. `cluster` has one id per value.
 Interval cluster_bootstrap(std::span<const double> values, std::span<const int> cluster, int resamples,
                            std::uint64_t seed, double level = 0.95);

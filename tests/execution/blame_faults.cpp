@@ -1,6 +1,6 @@
-// blame_faults [COUNT [THREADS]]: how often `duet blame` names the fault that was put into an engine or a policy, over
-// so many failed episodes of each kind, in mujoco, bullet and dart in turn. Exit code 1 below 95 of 100 of a kind, or
-// where a clean episode that succeeds is blamed on anybody.
+// blame_faults [COUNT [THREADS [KIND]]]: how often `duet blame` names the fault that was put into an engine or a
+// policy, over so many failed episodes of each kind, in mujoco, bullet and dart in turn. Exit code 1 below 95 of 100 of
+// a kind, or where a clean episode that succeeds is blamed on anybody.
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -60,13 +60,14 @@ Tally tally_of(const NamedFault& kind, const std::vector<std::unique_ptr<Experim
   return tally;
 }
 
-int run(int count, int threads) {
+int run(int count, int threads, std::string_view only) {
   Progress progress(Progress::Style::kQuiet);
   const auto made = experiments(count, threads, progress);  // 6 episodes for each that is counted
   bool reached = true;
   fmt::print("| fault | expected | named | of | solver | policy | unclear | episodes tried |\n");
   fmt::print("|---|---|---|---|---|---|---|---|\n");
   for (const NamedFault& kind : test::kFaults) {
+    if (!only.empty() && only != kind.name) continue;
     Tally tally = tally_of(kind, made, count, threads, progress);
     const int right = tally.named[kind.culprit], judged = tally.judged();
     fmt::print("| {} | {} | {} | {} | {} | {} | {} | {} |\n", kind.name, to_string(kind.culprit), right, judged,
@@ -84,5 +85,5 @@ int run(int count, int threads) {
 }  // namespace duet
 
 int main(int argc, char** argv) {
-  return duet::run(argc > 1 ? std::atoi(argv[1]) : 100, argc > 2 ? std::atoi(argv[2]) : 2);
+  return duet::run(argc > 1 ? std::atoi(argv[1]) : 100, argc > 2 ? std::atoi(argv[2]) : 2, argc > 3 ? argv[3] : "");
 }

@@ -45,7 +45,7 @@ class FaultySolver final : public Backend {
       auto robot = std::make_shared<RobotModel>(*scene.robot);
       for (const int foot : robot->feet) {
         Pose& at = robot->shapes[static_cast<std::size_t>(foot)].X_LS;
-        if (at.p.x() > 0.0) at.p.z() += 0.05;
+        if (at.p.x() > 0.0 && foot < robot->feet[4]) at.p.z() += 0.2;  // the left foot's toes never touch
       }
       scene.robot = robot;
     }

@@ -136,6 +136,18 @@ TEST(NewcombePaired, WithoutPairsSaysNothing) {
   EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { newcombe_paired(1, -2, 0, 0); }));
 }
 
+// Fisher's tea: 3 of 4 against 1 of 4, and every split of small tables adds up to one.
+TEST(Fisher, CountsTheTablesThatAreAtLeastAsFar) {
+  EXPECT_NEAR(fisher_exact_greater(3, 4, 1, 4), 17.0 / 70.0, 1e-13);
+  EXPECT_NEAR(fisher_exact_greater(4, 4, 0, 4), 1.0 / 70.0, 1e-13);
+  EXPECT_NEAR(fisher_exact_greater(0, 5, 3, 7), 1.0, 1e-13);
+  EXPECT_NEAR(fisher_exact_greater(5, 5, 3, 3), 1.0, 1e-13);
+  EXPECT_EQ(fisher_exact_greater(0, 0, 2, 3), 1.0);
+  for (long k = 1; k <= 4; ++k)  // more in one group is as likely as fewer in the other
+    EXPECT_NEAR(fisher_exact_greater(k, 5, 4 - k, 6) + fisher_exact_greater(5 - k, 6, k - 1, 5), 1.0, 1e-12) << k;
+  EXPECT_THROW(fisher_exact_greater(3, 2, 0, 4), std::invalid_argument);
+}
+
 // Twice the smaller tail over all 2^n ways in which the discordant pairs could have fallen.
 double enumerated_mcnemar(long only_a, long only_b) {
   const long n = only_a + only_b;
