@@ -190,18 +190,19 @@ def arms_of(folder):
 
 
 def actuation(folder):
-    """Success in % and falls of each policy in each engine, by arm."""
-    rows, table = [row for row in rows_in(folder) if row["arm"] == "main"], []
-    ran = {engine: name for engine, name in ENGINES.items() if any(row["engine"] == engine for row in rows)}
-    for policy, name in policies_and_controls({row["policy"] for row in rows}).items():
-        for arm in arms_of(folder):
-            line = [name, f"`{arm}`"]
-            for engine in ran:
-                some = [r for r in rows if (r["policy"], r["perturbation"], r["engine"]) == (policy, arm, engine)]
-                won = sum(bool(r["success"]) for r in some)
-                line.append(f"{short(won / len(some))} [{', '.join(wilson(won, len(some)))}]; {sum(r['fell'] for r in some)}/{len(some)}")
-            table.append(line)
-    return markdown(["Policy", "arm", *[f"{name}: success; fell" for name in ran.values()]], [False] * 2 + [True] * len(ran), table)
+    """Success in % and falls in each engine under each controller, by policy and arm."""
+    rows = [row for row in rows_in(folder) if row["arm"] == "main"]
+    groups = dict.fromkeys((row["engine"], row["controller"]) for row in rows)
+    columns = {(policy, arm): f"{policy}, `{arm}`" for policy in policies_and_controls({row["policy"] for row in rows}) for arm in arms_of(folder)}
+    table = []
+    for engine, controller in groups:
+        line = [ENGINES.get(engine, f"`{engine}`"), f"`{controller}`"]
+        for policy, arm in columns:
+            some = [r for r in rows if (r["engine"], r["controller"], r["policy"], r["perturbation"]) == (engine, controller, policy, arm)]
+            won = sum(bool(r["success"]) for r in some)
+            line.append(f"{short(won / len(some))} [{', '.join(wilson(won, len(some)))}]; {sum(r['fell'] for r in some)} of {len(some)}")
+        table.append(line)
+    return markdown(["Engine", "Controller", *columns.values()], [False] * 2 + [True] * len(columns), table)
 
 
 def actuation_walkers(folder, program):

@@ -9,6 +9,7 @@
 #include "duet/app/command.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/experiment/plan/actuation_limits.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/shipped_suites.h"
 #include "duet/experiment/suite_file/suite_actors.h"
@@ -76,6 +77,7 @@ Suite suite_of(const SuiteArguments& arguments) {
   }
   // A table that is broken is told before the first episode.
   if (!suite.contact_limits.empty()) static_cast<void>(load_contact_limits(suite.contact_limits));
+  require_bearable_law(suite);
   return suite;
 }
 

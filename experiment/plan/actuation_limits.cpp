@@ -7,6 +7,8 @@
 #include <map>
 
 #include "duet/backends/actuation.h"
+#include "duet/controllers/catalogue/registry.h"
+#include "duet/core/require.h"
 #include "duet/rows/episode_row.h"
 
 namespace duet {
@@ -77,6 +79,31 @@ std::vector<std::string> actuation_notes(const Suite& suite, const std::string& 
       if (std::ranges::find(notes, note) == notes.end()) notes.push_back(std::move(note));
     }
   return notes;
+}
+
+void require_bearable_law(const Suite& suite) {
+  for (const std::string& engine : suite.engines) {
+    if (engine == kPlaybackEngine) continue;
+    const EngineSettings settings = suite.profile.settings(engine);
+    if (settings.law != TorqueLaw::kExplicit) continue;
+    for (const SuiteController& controller : suite.controllers) {
+      const std::shared_ptr<const RobotModel> robot = load_shared_robot(suite.card_of(controller));
+      ExplicitStep step;
+      try {
+        step = step_with(robot, standing_gains(*make_controller(controller.use, robot, controller.options), *robot),
+                         settings.armature);
+      } catch (const MissingError&) {
+        continue;
+      }
+      if (settings.dt <= kShakesBeyond * step.largest) continue;
+      throw InputError(fmt::format(
+          "suite '{0}': law of engine '{1}': expected a step of at most {2:.2g} ms for the explicit law {3} under "
+          "controller '{4}', found {5:g} ms, at which {6} of {7} shakes whatever the policy does; give the controller "
+          "the option explicit_step: {8:g}, or, to measure what it costs, write it as a perturbation `actuation`",
+          suite.name, engine, 1e3 * step.largest, armature_text(settings.armature), controller.name, 1e3 * settings.dt,
+          joint_of(*robot, step), robot->name, settings.dt));
+    }
+  }
 }
 
 }  // namespace duet

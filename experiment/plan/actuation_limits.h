@@ -1,6 +1,6 @@
-// What the explicit torque law bears of a controller: the largest physics steps by its gains on its robot, and one
-// sentence where an episode's settings are beyond them. Found from the mass matrix before any episode runs
-// (robots/explicit_step.h). Pure functions.
+// What the explicit torque law bears of a controller: the largest physics steps by its gains on its robot, one sentence
+// where an episode's settings are beyond them, and a refusal where a whole suite's are. Found from the mass matrix
+// before any episode runs (robots/explicit_step.h).
 #pragma once
 
 #include <memory>
@@ -31,5 +31,14 @@ std::string to_text(const ActuationLimits& limits);
 // joint of the controller's robot: which, and the largest step at which it would not. None under the implicit law.
 std::vector<std::string> actuation_notes(const Suite& suite, const std::string& controller,
                                          const std::shared_ptr<const RobotModel>& robot, const JointGains& gains);
+
+// Feet on the ground make the ankles heavier than in the air, where the bound is found. "Falls at more than twice the
+// bound" is right of 152 of the 165 walks under an explicit law in results/published/actuation_walk.
+inline constexpr double kShakesBeyond = 2.0;
+
+// Refuses a suite whose own settings, and not a perturbation's, are an explicit law at more than kShakesBeyond times
+// the step that a controller of it bears: throws InputError with the joint, the largest step and what would do.
+// Controllers whose files are not on this machine are passed over.
+void require_bearable_law(const Suite& suite);
 
 }  // namespace duet

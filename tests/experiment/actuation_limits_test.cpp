@@ -7,6 +7,7 @@
 namespace duet {
 namespace {
 
+using test::thrown_message;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
@@ -58,6 +59,21 @@ TEST(ActuationLimits, NotesNameArmStepAndJointAndOnlyWhereTheExplicitLawIsBeyond
   EXPECT_THAT(found[0], AllOf(HasSubstr("controller 'pd', arm 'actuation'"), HasSubstr("at 1 ms without armature"),
                               HasSubstr("ankle_roll_joint of g1")));
   EXPECT_THAT(notes("law: explicit\narmature: 0\n").at(0), HasSubstr("arm 'clean': the explicit law at 2 ms"));
+}
+
+// The suite's own law, at a step that no gain of it bears, is refused with the step that it would bear.
+TEST(ActuationLimits, ASuiteWhoseOwnLawShakesIsRefusedAndAPerturbationIsNot) {
+  EXPECT_SENTENCE(
+      thrown_message<InputError>([] { require_bearable_law(suite_with("law: explicit\narmature: 0\ndt: 0.001\n")); }));
+  EXPECT_NO_THROW(require_bearable_law(suite_with("law: explicit\n")));
+  EXPECT_NO_THROW(require_bearable_law(suite_with("armature: 0\ndt: 0.001\n")));
+  EXPECT_NO_THROW(require_bearable_law(suite_with("law: explicit\narmature: 0\ndt: 0.0005\n")));  // up to twice
+  EXPECT_NO_THROW(require_bearable_law(suite_with("perturbations: [clean, actuation]\n")));
+  EXPECT_NO_THROW(require_bearable_law(
+      parse_suite("schema: duet.suite/1\nname: s\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\nengines: [ode]\n"
+                  "controllers: [{name: light, use: pd, options: {explicit_step: 0.001}}]\npolicies: [replay]\n"
+                  "law: explicit\narmature: 0\ndt: 0.001\n",
+                  "s.yaml")));
 }
 
 }  // namespace
