@@ -23,6 +23,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TASKS = {"hug": "Hug", "handshake": "Handshake", "high_five": "High-five", "wave": "Wave", "bend": "Bend", "fly_kiss": "Fly-kiss"}
 ENGINES = {"mujoco": "MuJoCo", "bullet": "Bullet", "ode": "ODE", "simbody": "Simbody", "dart": "DART"}
+WORLDS = {**ENGINES, "bullet_own": "Bullet, own world", "dart_own": "DART, own world", "ode_own": "ODE, own world"}
 POLICIES = {
     "dstar": "dstar",
     "dp": "dp",
@@ -196,7 +197,7 @@ def actuation(folder):
     columns = {(policy, arm): f"{policy}, `{arm}`" for policy in policies_and_controls({row["policy"] for row in rows}) for arm in arms_of(folder)}
     table = []
     for engine, controller in groups:
-        line = [ENGINES.get(engine, f"`{engine}`"), f"`{controller}`"]
+        line = [WORLDS.get(engine, f"`{engine}`"), f"`{controller}`"]
         for policy, arm in columns:
             some = [r for r in rows if (r["engine"], r["controller"], r["policy"], r["perturbation"]) == (engine, controller, policy, arm)]
             won = sum(bool(r["success"]) for r in some)
