@@ -105,8 +105,8 @@ const FieldTable<SynthesisOptions>& synthesis_fields() {
         field<O>(
             {.name = "like",
              .meaning = "rehearsed: long acts of two who come from three metres; people: short acts of two who stand "
-                        "close, cropped as recordings are",
-             .choices = {"rehearsed", "people"}},
+                        "close, cropped as recordings are; varied: such acts, drawn from more than recordings have",
+             .choices = {kLikenessNames.begin(), kLikenessNames.end()}},
             &O::like)};
     for (Field<O>& each : draw_fields()) fields.push_back(std::move(each));
     fields.push_back(field<O>(
@@ -119,6 +119,14 @@ const FieldTable<SynthesisOptions>& synthesis_fields() {
                                .meaning = "like people: how the act goes",
                                .choices = {kActOutcomeNames.begin(), kActOutcomeNames.end()}},
                               &O::outcome));
+    fields.push_back(field<O>({.name = "wait",
+                               .meaning = "varied: mean of the standing before, drawn without memory",
+                               .unit = "s",
+                               .range = kStanding},
+                              &O::wait));
+    fields.push_back(field<O>(
+        {.name = "still", .meaning = "varied, of a gesture: whether the partner stands still", .choices = flag_words()},
+        &O::still));
     return fields;
   }();
   return table;

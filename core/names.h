@@ -41,7 +41,7 @@ std::string plain_name_message(std::string_view name);  // the sentence for one 
 
 // The ids of clips: of those that are synthesised, and what is added to an id for another view or role of its clip.
 
-// "people-handshake-s42-0007"; `manner`: "synth" or "people".
+// "people-handshake-s42-0007"; `manner`: "synth", "people" or "varied".
 std::string synthetic_clip_id(std::string_view manner, std::string_view task, std::uint64_t seed, int index);
 
 // The id of the clip as a depth camera sees it.

@@ -10,9 +10,10 @@ namespace duet {
 
 enum class Side { kLeft, kRight };
 
-// The way in which the two act: that of the first generator (long acts, three metres apart at the start), or that of
-// recorded people (docs/synthesis.md).
-enum class Likeness { kScripted, kPeople };
+// The way in which the two act: that of the first generator (long acts, three metres apart at the start), that of
+// recorded people, or one that varies more than these do (docs/synthesis.md).
+enum class Likeness { kScripted, kPeople, kVaried };
+inline constexpr std::array<std::string_view, 3> kLikenessNames = {"rehearsed", "people", "varied"};  // in this order
 
 // How an act goes: done, done after a half-raised hand has waited, or broken off before anything touches.
 enum class ActOutcome { kComplete, kHesitant, kAborted };
@@ -32,10 +33,13 @@ struct SynthesisOptions {
   std::optional<double> duration{};              // of the whole clip [s]; default as in Table S6 per task
   double rate_hz = 50.0;
   Likeness like = Likeness::kScripted;
-  // With kPeople only; such clips are cropped to the act unless told:
+  // Not with kScripted; such clips are cropped to the act unless told:
   std::optional<double> before{};       // standing before anything moves [s]
   std::optional<double> after{};        // standing after everything [s]
   std::optional<ActOutcome> outcome{};  // default: drawn
+  // With kVaried only:
+  std::optional<double> wait{};  // mean of the standing before, drawn without memory, in place of `before` [s]
+  std::optional<bool> still{};   // of a gesture: whether B stands still, so that nobody announces it; default: drawn
 };
 
 }  // namespace duet

@@ -10,6 +10,7 @@
 #include "duet/tasks/rules/agent.h"
 #include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
+#include "duet/tasks/synthesis/varied.h"
 #include "duet/tasks/task_definition.h"
 
 namespace duet::synthesis {
@@ -65,6 +66,7 @@ Layout bend_layout(const Participants& cast, Draws& draws) {
     layout.distance += head_from_root(cast.body[k], layout.lean[k]).x();
   }
   layout.distance = std::min(layout.distance + draws.uniform("act.room", 0.0, 0.5), cast.farthest);
+  if (cast.manner.distance) layout.distance = std::max(layout.distance, *cast.manner.distance);
   stand_at_bearings(cast, layout);
   return layout;
 }
@@ -215,7 +217,8 @@ const TaskDefinition& bend() {
               .close = false,
               .layout = synthesis::bend_layout,
               .perform = synthesis::perform_bend,
-              .recorded = {.tempo = {1.0, 1.25, 1.6}, .way = {0.0, 0.1, 0.4}}},
+              .recorded = {.tempo = {1.0, 1.25, 1.6}, .way = {0.0, 0.1, 0.4}},
+              .varied = synthesis::varied_gesture(0.0)},
       .detector = {.thresholds = kBendThresholds,
                    .figures = kBendFigures,
                    .tracks = bend_tracks,

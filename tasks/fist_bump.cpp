@@ -12,6 +12,7 @@
 #include "duet/tasks/rules/agent.h"
 #include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
+#include "duet/tasks/synthesis/varied.h"
 #include "duet/tasks/task_definition.h"
 
 namespace duet::synthesis {
@@ -42,7 +43,7 @@ struct Bump {
 };
 
 Bump plan_bump(const Scene& scene, Draws& draws) {
-  const double touch = draws.styled("touch", 1.0 - scene.cast.style, 0.34, 0.90);
+  const double touch = scene.cast.manner.contact.value_or(draws.styled("touch", 1.0 - scene.cast.style, 0.34, 0.90));
   const double strike = draws.styled("strike", 1.0 - scene.cast.style, 0.30, 0.48);
   Bump bump;
   bump.explodes = draws.chance("explodes", 0.3);
@@ -227,7 +228,8 @@ const TaskDefinition& fist_bump() {
               .close = false,
               .layout = synthesis::fist_bump_layout,
               .perform = synthesis::perform_fist_bump,
-              .recorded = {.tempo = {1.2, 1.5, 1.8}, .way = {0.0, 0.2, 0.5}}},
+              .recorded = {.tempo = {1.2, 1.5, 1.8}, .way = {0.0, 0.2, 0.5}},
+              .varied = synthesis::varied_strike({0.2, 0.4, 0.9})},
       .detector = {.thresholds = kFistBumpThresholds,
                    .figures = kFistBumpFigures,
                    .tracks = fist_bump_tracks,

@@ -8,6 +8,7 @@
 #include "duet/tasks/rules/agent.h"
 #include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
+#include "duet/tasks/synthesis/varied.h"
 #include "duet/tasks/task_definition.h"
 
 namespace duet::synthesis {
@@ -60,6 +61,7 @@ Hold blown(double height) {
 Layout fly_kiss_layout(const Participants& cast, Draws& draws) {
   Layout layout;
   layout.distance = std::min(draws.uniform("act.distance", 1.2, 2.1), cast.farthest);
+  if (cast.manner.distance) layout.distance = *cast.manner.distance;
   for (Lean& lean : layout.lean) lean.forward = draws.styled("lean", cast.style, 0.02, 0.12);
   stand_at_bearings(cast, layout);
   return layout;
@@ -212,30 +214,30 @@ constexpr auto kFlyKissParaphrases = std::to_array<std::string_view>({
 namespace tasks {
 
 const TaskDefinition& fly_kiss() {
-  static constexpr TaskDefinition kDefinition = {
-      .name = "fly_kiss",
-      .prompt = "blow a kiss to the person",
-      .paraphrases = kFlyKissParaphrases,
-      .phrases = kFlyKissPhrases,
-      .phases = {.act = ActSignal::kHandsUp},
-      .act = {.mean_seconds = 17.9,
-              .shortest = 5.5,
-              .longest = 10.0,
-              .release = 1.1,
-              .lowest = 1.1,
-              .highest = 1.5,
-              .touch_distance = 0.0,
-              .close = false,
-              .layout = synthesis::fly_kiss_layout,
-              .perform = synthesis::perform_fly_kiss,
-              .recorded = {.tempo = {1.3, 1.6, 2.0}, .way = {0.0, 0.1, 0.4}}},
-      .detector = {.thresholds = kFlyKissThresholds,
-                   .figures = kFlyKissFigures,
-                   .tracks = fly_kiss_tracks,
-                   .detect = detect_fly_kiss,
-                   .read_strictly = read_fly_kiss_strictly},
-      .rule = &rules::kFlyKiss,
-      .interaction = {.onset = ActOnset::kHandRises}};
+  static constexpr TaskDefinition kDefinition = {.name = "fly_kiss",
+                                                 .prompt = "blow a kiss to the person",
+                                                 .paraphrases = kFlyKissParaphrases,
+                                                 .phrases = kFlyKissPhrases,
+                                                 .phases = {.act = ActSignal::kHandsUp},
+                                                 .act = {.mean_seconds = 17.9,
+                                                         .shortest = 5.5,
+                                                         .longest = 10.0,
+                                                         .release = 1.1,
+                                                         .lowest = 1.1,
+                                                         .highest = 1.5,
+                                                         .touch_distance = 0.0,
+                                                         .close = false,
+                                                         .layout = synthesis::fly_kiss_layout,
+                                                         .perform = synthesis::perform_fly_kiss,
+                                                         .recorded = {.tempo = {1.3, 1.6, 2.0}, .way = {0.0, 0.1, 0.4}},
+                                                         .varied = synthesis::varied_gesture(0.25)},
+                                                 .detector = {.thresholds = kFlyKissThresholds,
+                                                              .figures = kFlyKissFigures,
+                                                              .tracks = fly_kiss_tracks,
+                                                              .detect = detect_fly_kiss,
+                                                              .read_strictly = read_fly_kiss_strictly},
+                                                 .rule = &rules::kFlyKiss,
+                                                 .interaction = {.onset = ActOnset::kHandRises}};
   return kDefinition;
 }
 

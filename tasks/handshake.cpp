@@ -10,6 +10,7 @@
 #include "duet/tasks/rules/agent.h"
 #include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
+#include "duet/tasks/synthesis/varied.h"
 #include "duet/tasks/task_definition.h"
 
 namespace duet::synthesis {
@@ -50,9 +51,34 @@ std::vector<Burst> shake_bouts(double begin, double end, const MotionStyle& mann
   return bouts;
 }
 
+// With the hips as they stand and as they are turned.
+bool in_reach(const Participants& cast, const Layout& layout) {
+  for (const int k : {0, 1}) {
+    Lean lean = layout.lean[k];
+    for (const double hips : {0.0, layout.lean[k].hips}) {
+      lean.hips = hips;
+      const Eigen::Vector3d shoulder = shoulder_at(cast.body[k], cast.side, lean);
+      if ((seen_by(k, layout, layout.meet) - shoulder).norm() > 0.975 * cast.body[k].arm()) return false;
+    }
+  }
+  return true;
+}
+
+// People whose distance and turns were drawn apart from each other come nearer until the hands meet.
+Layout meeting_within_reach(const Participants& cast, double z, double distance, const Lean& lean, bool comes_nearer) {
+  constexpr double kStep = 0.03, kNearest = 0.7;  // [m]
+  Layout layout = meeting_at_distance(cast, z, distance, lean);
+  while (comes_nearer && distance > kNearest && !in_reach(cast, layout)) {
+    distance -= kStep;
+    layout = meeting_at_distance(cast, z, distance, lean);
+  }
+  return layout;
+}
+
 Layout handshake_layout(const Participants& cast, Draws& draws) {
   const double stature = 0.5 * (cast.body[0].height + cast.body[1].height);
-  const double z = cast.target_height ? *cast.target_height : stature * draws.uniform("target.share", 0.565, 0.62);
+  const double highest = draws.breadth() > 0.0 ? 0.70 : 0.62;
+  const double z = cast.target_height ? *cast.target_height : stature * draws.uniform("target.share", 0.565, highest);
   draws.record("target_height", z);
   const double share = draws.uniform("reach.share", 0.80, 0.87);
   Lean lean;
@@ -62,7 +88,7 @@ Layout handshake_layout(const Participants& cast, Draws& draws) {
                (cast.manner.rehearsed ? draws.uniform("twist", 0.10, 0.22) : draws.uniform("twist", -0.04, 0.06));
   if (cast.manner.distance) {
     lean.shift = draws.uniform("shift", 0.06, 0.14);  // onto the front foot; found by the speed of the roots
-    return meeting_at_distance(cast, z, *cast.manner.distance + 2.0 * lean.shift, lean);
+    return meeting_within_reach(cast, z, *cast.manner.distance + 2.0 * lean.shift, lean, draws.breadth() > 0.0);
   }
   // At least 0.45 m: closer, a hand is at the own belly.
   return meeting_layout(cast, z, share, 0.45, 0.62, lean);
@@ -282,7 +308,8 @@ const TaskDefinition& handshake() {
               .close = false,
               .layout = synthesis::handshake_layout,
               .perform = synthesis::perform_handshake,
-              .recorded = synthesis::kRecordedHandshake},
+              .recorded = synthesis::kRecordedHandshake,
+              .varied = synthesis::varied_handshake(synthesis::kReach)},
       .detector = {.thresholds = kHandshakeThresholds,
                    .figures = kHandshakeFigures,
                    .tracks = handshake_tracks,

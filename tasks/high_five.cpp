@@ -8,6 +8,7 @@
 #include "duet/tasks/rules/agent.h"
 #include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
+#include "duet/tasks/synthesis/varied.h"
 #include "duet/tasks/task_definition.h"
 
 namespace duet::synthesis {
@@ -24,7 +25,7 @@ struct Clap {
 std::vector<Clap> plan_claps(const Scene& scene, Draws& draws) {
   const double wait = draws.uniform("ready", 0.25, 0.6);
   const double strike = draws.styled("strike", 1.0 - scene.cast.style, 0.24, 0.36);
-  const double contact = draws.uniform("contact", 0.10, 0.18);
+  const double contact = scene.cast.manner.contact.value_or(draws.uniform("contact", 0.10, 0.18));
   const double first = kFiveRaise + scene.people[1].reaction;
   const double one = wait + strike + contact;
   const double room = scene.act_end - scene.act_begin - first;
@@ -221,7 +222,8 @@ const TaskDefinition& high_five() {
               .close = false,
               .layout = synthesis::high_five_layout,
               .perform = synthesis::perform_high_five,
-              .recorded = {.tempo = {1.4, 1.7, 2.0}, .way = {0.0, 0.2, 0.5}}},
+              .recorded = {.tempo = {1.4, 1.7, 2.0}, .way = {0.0, 0.2, 0.5}},
+              .varied = synthesis::varied_strike({0.06, 0.2, 0.8})},
       .detector = {.thresholds = kHighFiveThresholds,
                    .figures = kHighFiveFigures,
                    .tracks = high_five_tracks,

@@ -12,6 +12,7 @@
 #include "duet/tasks/rules/agent.h"
 #include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
+#include "duet/tasks/synthesis/varied.h"
 #include "duet/tasks/task_definition.h"
 
 namespace duet::synthesis {
@@ -384,7 +385,8 @@ const TaskDefinition& hug() {
               .close = true,
               .layout = synthesis::hug_layout,
               .perform = synthesis::perform_hug,
-              .recorded = synthesis::kRecordedHug},
+              .recorded = synthesis::kRecordedHug,
+              .varied = synthesis::varied_hug(synthesis::kRecordedHug)},
       .detector = {.thresholds = kHugThresholds, .figures = kHugFigures, .tracks = hug_tracks, .detect = detect_hug},
       .rule = &rules::kHug,
       .interaction = {.touch = Touch::kArmsRoundTrunk, .touch_s = 0.5, .includes = kHugIncludes}};

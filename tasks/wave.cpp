@@ -14,6 +14,7 @@
 #include "duet/tasks/rules/agent.h"
 #include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
+#include "duet/tasks/synthesis/varied.h"
 #include "duet/tasks/task_definition.h"
 
 namespace duet::synthesis {
@@ -26,6 +27,7 @@ struct Waving {
   double amplitude;  // half of the stroke [m]
   double height;     // of the hand above the ground [m]
   Burst strokes;
+  double ahead = 0.36, outward = 0.26;  // of the shoulder, in arms: the forearm waves, or the arm does
 };
 
 // The hand swings about the elbow: lowest at either end of the stroke, a little forward towards the middle of the body.
@@ -33,7 +35,8 @@ Hold waving_hand(const Waving& waving) {
   return [=](const Moment& m) {
     const double stroke = waving.amplitude * waving.strokes.at(m.t);
     const Eigen::Vector3d shoulder = m.own.p.col(sided(kLeftShoulder, m.side));
-    const Eigen::Vector3d offset(0.36 * m.body.arm() - 0.2 * stroke, 0.26 * m.body.arm() + stroke, 0.0);
+    const Eigen::Vector3d offset(waving.ahead * m.body.arm() - 0.2 * stroke, waving.outward * m.body.arm() + stroke,
+                                 0.0);
     ArmPose arm;
     arm.hand = shoulder + chest_vector(m, offset) + 0.006 * m.sway;
     arm.hand.z() = waving.height + 0.006 * m.sway.z() - 1.6 * stroke * stroke;
@@ -46,6 +49,7 @@ Hold waving_hand(const Waving& waving) {
 Layout wave_layout(const Participants& cast, Draws& draws) {
   Layout layout;
   layout.distance = std::min(draws.uniform("act.distance", 1.2, 2.2), cast.farthest);
+  if (cast.manner.distance) layout.distance = *cast.manner.distance;
   stand_at_bearings(cast, layout);
   return layout;
 }
@@ -67,6 +71,10 @@ void perform_wave(Scene& scene, Draws& draws) {
     waving.amplitude = std::min(usual, kFastestHand / (2.0 * std::numbers::pi * rate));
     waving.height = scene.cast.target_height.value_or(high * person.body.height);
     waving.strokes = {begin[k] + 0.75 * kWaveRaise, end[k], rate, 0.35};
+    if (draws.breadth() > 0.0) {
+      waving.ahead = draws.uniform(who + "wave.ahead", 0.15, 0.6);
+      waving.outward = draws.uniform(who + "wave.outward", 0.1, 0.5);
+    }
     draws.record(who + "target_height", waving.height);
     person.arms[side].to(begin[k], begin[k] + kWaveRaise, waving_hand(waving), {0.08, 0.06, 0.0});
     person.arms[side].rest(end[k], end[k] + scene.release_end - scene.act_end, {0.08, 0.05, 0.0});
@@ -314,29 +322,29 @@ constexpr auto kWaveParaphrases = std::to_array<std::string_view>({
 namespace tasks {
 
 const TaskDefinition& wave() {
-  static constexpr TaskDefinition kDefinition = {
-      .name = "wave",
-      .prompt = "wave to the person",
-      .paraphrases = kWaveParaphrases,
-      .phrases = kWavePhrases,
-      .phases = {.act = ActSignal::kHandsUp},
-      .act = {.mean_seconds = 18.6,
-              .shortest = 4.5,
-              .longest = 9.0,
-              .release = 1.0,
-              .lowest = 1.45,
-              .highest = 1.7,
-              .touch_distance = 0.0,
-              .close = false,
-              .layout = synthesis::wave_layout,
-              .perform = synthesis::perform_wave,
-              .recorded = {.tempo = {1.0, 1.2, 1.5}, .way = {0.0, 0.1, 0.4}}},
-      .detector = {.thresholds = kWaveThresholds,
-                   .figures = kWaveFigures,
-                   .tracks = wave_tracks,
-                   .detect = detect_wave},
-      .rule = &rules::kWave,
-      .interaction = {.onset = ActOnset::kHandRises}};
+  static constexpr TaskDefinition kDefinition = {.name = "wave",
+                                                 .prompt = "wave to the person",
+                                                 .paraphrases = kWaveParaphrases,
+                                                 .phrases = kWavePhrases,
+                                                 .phases = {.act = ActSignal::kHandsUp},
+                                                 .act = {.mean_seconds = 18.6,
+                                                         .shortest = 4.5,
+                                                         .longest = 9.0,
+                                                         .release = 1.0,
+                                                         .lowest = 1.45,
+                                                         .highest = 1.7,
+                                                         .touch_distance = 0.0,
+                                                         .close = false,
+                                                         .layout = synthesis::wave_layout,
+                                                         .perform = synthesis::perform_wave,
+                                                         .recorded = {.tempo = {1.0, 1.2, 1.5}, .way = {0.0, 0.1, 0.4}},
+                                                         .varied = synthesis::varied_gesture(0.12)},
+                                                 .detector = {.thresholds = kWaveThresholds,
+                                                              .figures = kWaveFigures,
+                                                              .tracks = wave_tracks,
+                                                              .detect = detect_wave},
+                                                 .rule = &rules::kWave,
+                                                 .interaction = {.onset = ActOnset::kHandRises}};
   return kDefinition;
 }
 

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -47,8 +48,7 @@ struct ClipSource {
 };
 
 std::string id_of(const SyntheticClip& clip) {
-  std::string id = synthetic_clip_id(clip.like == Likeness::kPeople ? "people" : "synth", to_string(clip.task),
-                                     clip.seed, clip.index);
+  std::string id = synthetic_clip_id(synthetic_manner(clip.like), to_string(clip.task), clip.seed, clip.index);
   if (clip.tracked) id = tracked_clip_id(id);
   return clip.variant == nullptr ? id : id + "-" + clip.variant->name;
 }
@@ -128,8 +128,11 @@ constexpr double kStandingBefore = 4.0, kStandingAfter = 2.0;  // [s]; as record
 void like_people(const SyntheticClip& source, SynthesisOptions& options) {
   constexpr double kHesitant = 0.1;
   Random random(source.seed, stream_key({"hesitates", to_string(source.task), std::to_string(source.index)}));
-  options.like = Likeness::kPeople;
-  options.before = kStandingBefore;
+  options.like = source.like;
+  if (source.like == Likeness::kVaried)
+    options.wait = kStandingBefore;
+  else
+    options.before = kStandingBefore;
   options.after = kStandingAfter;
   options.outcome = random.chance(kHesitant) ? ActOutcome::kHesitant : ActOutcome::kComplete;
 }
@@ -139,12 +142,15 @@ void like_people(const SyntheticClip& source, SynthesisOptions& options) {
 ClipPadding vary_standing(const SyntheticClip& source, SynthesisOptions& options) {
   constexpr double kShortest = 2.5, kLongest = 5.5;  // before the act [s]
   Random random(source.seed, stream_key({"stands", to_string(source.task), std::to_string(source.index)}));
-  const double before = random.uniform(kShortest, kLongest);
+  const bool memoryless = source.like == Likeness::kVaried;
+  const double before =
+      memoryless ? -kStandingBefore * std::log1p(-random.uniform()) : random.uniform(kShortest, kLongest);
   if (random.chance(0.5)) {
     options.before = before;
+    options.wait = std::nullopt;
     return {};
   }
-  options.before = options.after = std::nullopt;  // cropped as recordings are
+  options.before = options.after = options.wait = std::nullopt;  // cropped as recordings are
   return {before, kStandingAfter};
 }
 
@@ -153,12 +159,12 @@ InteractionClip synthesize(const SyntheticClip& source) {
   options.seed = source.seed;
   options.index = source.index;
   ClipPadding frozen;
-  if (source.like == Likeness::kPeople) like_people(source, options);
+  if (source.like != Likeness::kScripted) like_people(source, options);
   if (source.varied) frozen = vary_standing(source, options);
-  if (source.cropped) options.before = options.after = std::nullopt;
+  if (source.cropped) options.before = options.after = options.wait = std::nullopt;
   if (source.variant != nullptr) vary(*source.variant, options);
   InteractionClip clip = synthesize(source.task, options);
-  if (source.tracked) clip = add_tracker_noise(clip, {}, source.seed);
+  if (source.tracked) clip = add_tracker_noise(clip, tracker_of(clip, source.seed), source.seed);
   clip = with_padding(std::move(clip), frozen);
   clip.id = id_of(source);
   return clip;
@@ -409,7 +415,7 @@ std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const PairOpt
   clips.synth_per_task = per_task;
   clips.synth_seed = seed;
   std::vector<ClipSource> sources = list_sources(tasks, clips);
-  for (ClipSource& source : sources) std::get<SyntheticClip>(source.from).varied = like == Likeness::kPeople;
+  for (ClipSource& source : sources) std::get<SyntheticClip>(source.from).varied = like != Likeness::kScripted;
   return by_task(make_clips(sources, robot, pair, threads, progress), tasks);
 }
 

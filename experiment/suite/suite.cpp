@@ -155,7 +155,8 @@ const NameTable<ClipRoles>& role_names() {
 }
 
 const NameTable<Likeness>& likeness_names() {
-  static const NameTable<Likeness> names = {{"rehearsed", Likeness::kScripted}, {"people", Likeness::kPeople}};
+  static const NameTable<Likeness> names = {
+      {"rehearsed", Likeness::kScripted}, {"people", Likeness::kPeople}, {"varied", Likeness::kVaried}};
   return names;
 }
 

@@ -46,7 +46,7 @@ const NameTable<SuiteStart>& start_names();
 const NameTable<Side>& side_names();
 const NameTable<ActOutcome>& act_outcome_names();
 const NameTable<ClipRoles>& role_names();
-const NameTable<Likeness>& likeness_names();  // "rehearsed", "people"
+const NameTable<Likeness>& likeness_names();  // "rehearsed", "people", "varied"
 const NameTable<PartnerMode>& partner_names();
 const NameTable<RecordTrajectories>& record_names();
 const NameTable<DetectorVersion>& version_names();

@@ -78,11 +78,26 @@ Errors misplaced(const TrackerModel& tracker, Random random) {
   for (std::size_t i = 0; i < kColumns.size(); ++i) {
     const SmplJoint joint = kColumns[i];
     if (joint == kNeck) errors[i].z() = -tracker.low_neck;
+    if (joint == kHead) errors[i].z() = tracker.high_head;
     if (joint == kLeftShoulder || joint == kRightShoulder) errors[i].z() = -tracker.low_shoulders;
     if (joint == kLeftKnee || joint == kRightKnee) errors[i] = 0.5 * feet[joint == kLeftKnee ? 0 : 1];
     if (joint == kLeftAnkle || joint == kRightAnkle) errors[i] = feet[joint == kLeftAnkle ? 0 : 1];
   }
   return errors;
+}
+
+// Where the skeleton that it fits has another joint than a body model, from there. [m]
+Eigen::Vector3d skeleton_offset(const PointTracks::ConstFrame& joints, SmplJoint joint, const TrackerModel& tracker) {
+  const auto towards = [&](SmplJoint other, double share) -> Eigen::Vector3d {
+    return share * (joints.col(other) - joints.col(joint));
+  };
+  if (joint == kLeftShoulder) return towards(kRightShoulder, tracker.narrow_shoulders);
+  if (joint == kRightShoulder) return towards(kLeftShoulder, tracker.narrow_shoulders);
+  if (joint == kLeftHip) return towards(kRightHip, tracker.narrow_hips);
+  if (joint == kRightHip) return towards(kLeftHip, tracker.narrow_hips);
+  if (joint == kLeftElbow) return towards(kLeftHand, tracker.low_elbows);
+  if (joint == kRightElbow) return towards(kRightHand, tracker.low_elbows);
+  return Eigen::Vector3d::Zero();
 }
 
 PointTracks seen(const HumanMotion& person, const HumanMotion& other, const TrackerModel& tracker, int frames,
@@ -108,6 +123,7 @@ PointTracks seen(const HumanMotion& person, const HumanMotion& other, const Trac
       const Eigen::Vector3d here = person.joints.at(at.frame, joint), there = person.joints.at(next, joint);
       drift[i] = keep * drift[i] + add * tracker.drift * normal3(random);
       Eigen::Vector3d error = staying[i] + drift[i] + noise * normal3(random);
+      error += skeleton_offset(person.joints.frame(at.frame), joint, tracker);
       if (is_limb(joint)) error += tracker.limb_noise * normal3(random);
       if (is_arm(joint)) {
         const int side = is_left(joint) ? 0 : 1;
@@ -124,12 +140,31 @@ void check_tracker(const TrackerModel& tracker) {
           tracker.rate_hz);
   for (const double value :
        {tracker.noise, tracker.crowded, tracker.drift, tracker.limb_noise, tracker.feet, tracker.low_neck,
-        tracker.low_shoulders, tracker.hidden_within, tracker.lost_share, tracker.lost_noise})
+        tracker.low_shoulders, tracker.high_head, tracker.hidden_within, tracker.lost_share, tracker.lost_noise})
     require(value >= 0.0, "tracked clip: expected figures of 0 or more, found {}", value);
   require(tracker.drift_time > 0.0, "tracked clip: expected a positive drift_time, found {}", tracker.drift_time);
 }
 
 }  // namespace
+
+TrackerModel tracker_of(const InteractionClip& clip, std::uint64_t seed) {
+  TrackerModel tracker;
+  const auto like = clip.source.find("like");
+  if (like == clip.source.end() || like->second != "varied") return tracker;
+  Random random(seed, stream_key({"tracker", clip.id}));
+  tracker.rate_hz = random.chance(0.5) ? 15.0 : 30.0;
+  tracker.noise = random.uniform(0.001, 0.003);
+  tracker.limb_noise = random.uniform(0.002, 0.012);
+  tracker.feet = random.uniform(0.02, 0.22);
+  tracker.low_neck = random.uniform(0.06, 0.14);
+  tracker.low_shoulders = random.uniform(0.03, 0.08);
+  tracker.high_head = random.uniform(0.0, 0.10);
+  tracker.narrow_shoulders = random.uniform(-0.04, 0.14);
+  tracker.narrow_hips = random.uniform(-0.14, 0.11);
+  tracker.low_elbows = random.uniform(0.0, 0.22);
+  tracker.lost_share = random.uniform(0.06, 0.3);
+  return tracker;
+}
 
 InteractionClip add_tracker_noise(const InteractionClip& clip, const TrackerModel& tracker, std::uint64_t seed) {
   check_tracker(tracker);

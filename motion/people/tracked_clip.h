@@ -21,11 +21,17 @@ struct TrackerModel {
   // half of it in the knees; and the neck, and the shoulders, so much lower than a body model has them. [m]
   double feet = 0.19;
   double low_neck = 0.12, low_shoulders = 0.06;
+  double high_head = 0.0;  // and the head so much higher: its middle, where a body model has its lower end [m]
+  // Shares of the way to the other shoulder, to the other hip and from elbow to hand by which it has a joint there.
+  double narrow_shoulders = 0.0, narrow_hips = 0.0, low_elbows = 0.0;
   // A hand within this of the other person is lost at times, and jumps. [m]
   double hidden_within = 0.30;
   double lost_share = 0.16;  // of such frames
   double lost_noise = 0.06;  // standard deviation of elbow and hand then [m]
 };
+
+// The tracker that saw a synthetic clip: that of SBU, or drawn from wider ranges for one that varies.
+TrackerModel tracker_of(const InteractionClip& clip, std::uint64_t seed);
 
 inline constexpr double kCrowded = 0.8;  // between the roots, level [m]
 

@@ -52,6 +52,11 @@ TorsoPose torso_at(const Performer& person, const Performer& partner, double t) 
                      person.shift.at(t) + kStanceSway * person.sway[0].at(t),
                      person.hips.at(t)};
   TorsoPose torso = standing_torso(person.body, root, lean, 0.0);
+  if (person.aside != 0.0) {
+    torso.pelvis_yaw += person.aside;
+    torso.twist -= person.aside;
+  }
+  if (person.stoop != 0.0) torso.spine_bend += person.stoop;
   const double aside = kWeightShift * weight + 1.5 * kStanceSway * person.sway[1].at(t);
   torso.pelvis.head<2>() += aside * Eigen::Vector2d(-std::sin(root.yaw), std::cos(root.yaw));
   torso.pelvis_roll = kPelvisDrop * weight;

@@ -240,10 +240,11 @@ namespace {
 // Chosen, not measured: SBU's recordings are of acts that were asked for and done. The three of its 18 handshakes in
 // which no hands meet are what there is to say of acts that come to nothing.
 constexpr double kHesitantShare = 0.10, kAbortedShare = 0.08;
-constexpr double kMostReaction = 0.6;   // of the planned motion: the acts leave no more [s]
-constexpr double kQuickestWalk = 0.55;  // two steps, however short [s]
-constexpr double kShortestStep = 0.05;  // less is no walk [m]
-constexpr double kBegin = 30.0;         // of the scene's time, so that nothing lies before 0 [s]
+constexpr double kMostReaction = 0.6;      // of the planned motion: the acts leave no more [s]
+constexpr double kQuickestWalk = 0.55;     // two steps, however short [s]
+constexpr double kShortestStep = 0.05;     // less is no walk [m]
+constexpr double kShortestContact = 0.04;  // [s]
+constexpr double kBegin = 30.0;            // of the scene's time, so that nothing lies before 0 [s]
 // Kinect's arms end before SMPL's; its people are students (docs/synthesis.md).
 constexpr double kShortestArms = 0.90, kLongestArms = 1.02;
 
@@ -252,18 +253,24 @@ Hold half_way() { return from_shoulder({0.55, -0.02, -0.35}, {-0.4, 0.45, -1.0},
 bool stretches_arms(Task task) { return task != Task::kBend; }
 
 Participants draw_cast(Task task, const SynthesisOptions& options, Draws& draws) {
-  const RecordedManner& recorded = definition_of(task).act.recorded;
+  const RecordedManner& recorded = manner_of(task, options.like);
   const std::optional<bool> left =
       options.side ? std::optional<bool>(*options.side == Side::kLeft) : std::optional<bool>();
+  const auto height = [&](const char* who, std::optional<double> given) -> std::optional<double> {
+    if (given || recorded.height.middle == 0.0) return given;
+    return std::clamp(draws.spread(who, recorded.height), 1.5, 1.95);
+  };
   Participants cast;
-  cast.body = {draw_body("a.", options.height_a, draws, kShortestArms, kLongestArms),
-               draw_body("b.", options.height_b, draws, kShortestArms, kLongestArms)};
+  cast.body = {draw_body("a.", height("a.stature", options.height_a), draws, kShortestArms, kLongestArms),
+               draw_body("b.", height("b.stature", options.height_b), draws, kShortestArms, kLongestArms)};
   cast.side = draws.chance("left_handed", recorded.left, left) ? 0 : 1;
   cast.style = draws.uniform("style", 0.0, 1.0, options.style);
   cast.target_height = options.target_height;
   cast.manner.rehearsed = false;
   cast.manner.tempo = draws.spread("tempo", recorded.tempo);
   if (recorded.distance.middle > 0.0) cast.manner.distance = draws.spread("act.apart", recorded.distance);
+  if (recorded.contact.middle > 0.0)
+    cast.manner.contact = cast.manner.tempo * std::max(kShortestContact, draws.spread("contact", recorded.contact));
   for (const int k : {0, 1}) {
     const std::string who(kWho[k]);
     if (recorded.turn.middle > 0.0) cast.manner.turn[k] = draws.spread(who + "turn", recorded.turn);
@@ -273,12 +280,12 @@ Participants draw_cast(Task task, const SynthesisOptions& options, Draws& draws)
 }
 
 // How long the act is, at tempo 1. [s]
-double draw_act(const Act& act, double tempo, Draws& draws) {
-  const RecordedManner& recorded = act.recorded;
+double draw_act(const Act& act, const RecordedManner& recorded, const MotionStyle& manner, Draws& draws) {
+  const double tempo = manner.tempo;
   if (recorded.touch.middle > 0.0)
     return recorded.until_touch + tempo * std::max(0.05, draws.spread("touch", recorded.touch));
   if (recorded.act.middle > 0.0) return draws.spread("act", recorded.act);
-  return draws.uniform("act", act.shortest, 0.6 * act.shortest + 0.4 * act.longest);
+  return draws.uniform("act", act.shortest, 0.6 * act.shortest + 0.4 * act.longest) + manner.contact.value_or(0.0);
 }
 
 // The four ends of the two ways, the middle between the two in the act at the origin: each comes straight to its place,
@@ -350,15 +357,17 @@ ActOutcome draw_outcome(const SynthesisOptions& options, Draws& draws) {
 }
 
 // Crops the clip as recordings are, or to the time asked for before the first step and after the last.
-void crop(const Act& act, const SynthesisOptions& options, double last, PlannedScene& staged, Draws& draws) {
+void crop(const RecordedManner& recorded, const SynthesisOptions& options, double last, PlannedScene& staged,
+          Draws& draws) {
   const Scene& scene = staged.scene;
   const double tempo = scene.cast.manner.tempo;
-  const double touch = scene.act_begin + act.recorded.until_touch;
-  const double before = draws.spread("before", act.recorded.before), after = draws.spread("after", act.recorded.after);
+  const double touch = scene.act_begin + recorded.until_touch;
+  const double before = draws.spread("before", recorded.before), after = draws.spread("after", recorded.after);
   // All that moves before the act: hands open for a hug, or hesitate, up to three seconds ahead of it.
   const double first = std::min(kBegin, scene.act_begin - 3.0 - tempo);
   staged.showing.tempo = tempo;
-  staged.showing.first = options.before ? first - tempo * *options.before : touch - tempo * std::max(0.1, before);
+  const std::optional<double> stands = options.wait ? draws.memoryless("wait", *options.wait) : options.before;
+  staged.showing.first = stands ? first - tempo * *stands : touch - tempo * std::max(0.1, before);
   const double end = options.after ? last + tempo * *options.after : scene.act_end + tempo * std::max(0.05, after);
   staged.frames = std::max(5, static_cast<int>(std::lround((end - staged.showing.first) / tempo * options.rate_hz)));
 }
@@ -367,15 +376,17 @@ void crop(const Act& act, const SynthesisOptions& options, double last, PlannedS
 
 PlannedScene set_people_stage(Task task, const SynthesisOptions& options, Draws& draws, ActOutcome& outcome) {
   const Act& act = definition_of(task).act;
+  const RecordedManner& recorded = manner_of(task, options.like);
+  const bool still = recorded.still > 0.0 && draws.chance("still", recorded.still, options.still);
   Participants cast = draw_cast(task, options, draws);
   const double tempo = cast.manner.tempo;
   const Layout layout = act.layout(cast, draws);
   const double roots = std::hypot(layout.distance, layout.lateral);
   draws.record("act.distance", roots);
-  const double drawn_way = std::max(0.0, draws.spread("way", act.recorded.way));
+  const double drawn_way = std::max(0.0, draws.spread("way", recorded.way));
   const double way = options.distance ? std::max(0.0, *options.distance - roots) : drawn_way;
   const double angle = draws.uniform("angle", -0.15, 0.15, options.angle);
-  ApproachPaths ways = people_ways(layout, way, angle, draw_share(act.recorded.stands, draws));
+  ApproachPaths ways = people_ways(layout, way, angle, still ? 1.0 : draw_share(recorded.stands, draws));
   for (const int k : {0, 1})
     if ((ways.act[k].position - ways.start[k].position).norm() < kShortestStep) ways.start[k] = ways.act[k];
 
@@ -386,34 +397,54 @@ PlannedScene set_people_stage(Task task, const SynthesisOptions& options, Draws&
                                      0.0,
                                      0.0,
                                      0.0,
-                                     {}}};
+                                     {}},
+                      .still = still};
   Scene& scene = staged.scene;
-  const double speed = options.speed.value_or(std::max(0.3, draws.spread("speed", act.recorded.speed)));
+  const double speed = options.speed.value_or(std::max(0.3, draws.spread("speed", recorded.speed)));
   const double later = draws.uniform("b.starts_later", 0.0, 0.3) * tempo;
   double arrive = kBegin;
   for (const int k : {0, 1}) {
     Performer& person = scene.people[k];
     person.meets_skin = true;
     person.reaction =
-        k == 0 ? 0.0 : std::clamp(draws.spread("b.reaction", act.recorded.reaction) * tempo, 0.0, kMostReaction);
+        k == 0 ? 0.0 : std::clamp(draws.spread("b.reaction", recorded.reaction) * tempo, 0.0, kMostReaction);
+    if (recorded.aside.high > 0.0) person.aside = draws.spread(std::string(kWho[k]) + "aside", recorded.aside);
+    if (recorded.stoop.high > 0.0) person.stoop = draws.spread(std::string(kWho[k]) + "stoop", recorded.stoop);
     give_walk(person, ways.act[k], speed, tempo, kBegin + k * later);
     arrive = std::max(arrive, walked_until(person));
   }
-  scene.act_begin = arrive - std::max(0.0, draws.spread("overlap", act.recorded.overlap)) * tempo;
+  scene.act_begin = arrive - std::max(0.0, draws.spread("overlap", recorded.overlap)) * tempo;
+  if (recorded.pause > 0.0) scene.act_begin += draws.memoryless("pause", recorded.pause) * tempo;
   // An embrace closes when B's arms do.
-  scene.act_end = scene.act_begin + draw_act(act, tempo, draws) + (act.close ? scene.people[1].reaction : 0.0);
+  scene.act_end =
+      scene.act_begin + draw_act(act, recorded, cast.manner, draws) + (act.close ? scene.people[1].reaction : 0.0);
   scene.release_end = scene.act_end + act.release;
   double last = scene.release_end;
   for (const int k : {0, 1}) {
     Performer& person = scene.people[k];
+    if (k == 1 && still) break;
     give_leave(person, std::max(scene.act_end + 0.1 * tempo, walked_until(person)), speed, tempo, std::string(kWho[k]),
                draws);
     last = std::max(last, walked_until(person));
   }
   outcome = draw_outcome(options, draws);
   if (outcome == ActOutcome::kHesitant) hesitate(task, scene, draws);
-  crop(act, options, last, staged, draws);
+  crop(recorded, options, last, staged, draws);
   return staged;
+}
+
+const RecordedManner& manner_of(Task task, Likeness like) {
+  const Act& act = definition_of(task).act;
+  return like == Likeness::kVaried ? act.varied : act.recorded;
+}
+
+void use_both_hands(const RecordedManner& manner, Scene& scene, Draws& draws) {
+  if (manner.both_hands == 0.0) return;
+  const int side = scene.cast.side;
+  for (const int k : {0, 1}) {
+    std::array<ArmTrack, 2>& arms = scene.people[k].arms;
+    if (draws.chance(std::string(kWho[k]) + "both_hands", manner.both_hands)) arms[1 - side] = arms[side];
+  }
 }
 
 void perform_abort(Scene& scene, Draws& draws) {

@@ -27,6 +27,7 @@ struct PlannedScene {
   Scene scene;
   int frames = 0;
   RenderOptions showing = {};
+  bool still = false;  // B has no part in the act
 };
 
 // Draws what `options` (already checked) leaves open and plans everything but the act's gestures. Throws
@@ -59,6 +60,12 @@ void look_away(Scene& scene);
 // Draws what `options` (already checked) leaves open and plans everything but the act's gestures; who hesitates does so
 // here. `outcome` says how the act ends.
 PlannedScene set_people_stage(Task task, const SynthesisOptions& options, Draws& draws, ActOutcome& outcome);
+
+// The manner in which people do a task; none of rehearsed ones.
+const RecordedManner& manner_of(Task task, Likeness like);
+
+// Once the act has been performed: some use the other hand, too.
+void use_both_hands(const RecordedManner& manner, Scene& scene, Draws& draws);
 
 // In place of the act's gestures: A, and perhaps B, reaches half way and draws back.
 void perform_abort(Scene& scene, Draws& draws);

@@ -33,7 +33,7 @@ void check_synthesis_options(Task task, const SynthesisOptions& options) {
   require(options.index >= 0, "synthesize: index {} is out of range; expected 0 or more", options.index);
   check("height_a", options.height_a, 1.5, 1.95, " m");
   check("height_b", options.height_b, 1.5, 1.95, " m");
-  const bool people = options.like == Likeness::kPeople;
+  const bool people = options.like != Likeness::kScripted, varied = options.like == Likeness::kVaried;
   check("distance", options.distance, people ? 0.3 : 2.0, 5.0, " m");
   check("angle", options.angle, -std::numbers::pi / 3.0, std::numbers::pi / 3.0, " rad");
   check("speed", options.speed, people ? 0.3 : 0.6, 1.2, " m/s");
@@ -42,10 +42,17 @@ void check_synthesis_options(Task task, const SynthesisOptions& options) {
   check("rate_hz", options.rate_hz, 20.0, 240.0, " Hz");
   check("before", options.before, 0.0, 30.0, " s");
   check("after", options.after, 0.0, 30.0, " s");
+  check("wait", options.wait, 0.0, 30.0, " s");
   require(!people || !options.duration,
           "synthesize: clips like people have no duration; expected before and after, which say what is shown");
   require(people || (!options.before && !options.after && !options.outcome),
-          "synthesize: before, after and outcome are of clips like people; expected like=people");
+          "synthesize: before, after and outcome are of clips like people; expected like=people or like=varied");
+  require(varied || (!options.wait && !options.still),
+          "synthesize: wait and still are of clips that vary; expected like=varied");
+  require(!options.wait || !options.before, "synthesize: wait draws what before gives; expected one of them");
+  require(!options.still || act.varied.still > 0.0,
+          "synthesize: {} needs both people; expected no value of still, found {}", to_string(task),
+          options.still.value_or(false));
   if (options.target_height)
     require(act.lowest < act.highest, "synthesize: {} has no target_height; expected none, found {} m", to_string(task),
             *options.target_height);
@@ -76,21 +83,44 @@ Phases phases_of(const PlannedScene& staged, double rate_hz) {
 
 }  // namespace
 
-InteractionClip synthesize(Task task, const SynthesisOptions& options) {
-  check_synthesis_options(task, options);
-  const Act& act = definition_of(task).act;
-  const bool people = options.like == Likeness::kPeople;
-  Draws draws(options.seed, task, options.index);
+namespace {
+
+// What is asked of a clip's side and angle, as it is before the clip is turned into its mirror image.
+SynthesisOptions before_mirror(SynthesisOptions options) {
+  if (options.side) options.side = *options.side == Side::kLeft ? Side::kRight : Side::kLeft;
+  if (options.angle) options.angle = -*options.angle;
+  return options;
+}
+
+void perform(const Act& act, const synthesis::RecordedManner& manner, ActOutcome outcome, PlannedScene& staged,
+             Draws& draws) {
+  const synthesis::Performer partner = staged.scene.people[1];
+  if (outcome == ActOutcome::kAborted) {
+    perform_abort(staged.scene, draws);
+  } else {
+    act.perform(staged.scene, draws);
+    use_both_hands(manner, staged.scene, draws);
+  }
+  if (staged.still) staged.scene.people[1] = partner;
+  synthesis::look_away(staged.scene);
+}
+
+}  // namespace
+
+InteractionClip synthesize(Task task, const SynthesisOptions& given) {
+  check_synthesis_options(task, given);
+  const bool people = given.like != Likeness::kScripted;
+  const synthesis::RecordedManner manner =
+      people ? synthesis::manner_of(task, given.like) : synthesis::RecordedManner{};
+  Draws draws(given.seed, task, given.index, manner.breadth);
+  const bool mirror = manner.mirrored > 0.0 && draws.chance("mirrored", manner.mirrored);
+  const SynthesisOptions options = mirror ? before_mirror(given) : given;
   ActOutcome outcome = ActOutcome::kComplete;
   PlannedScene staged = people ? set_people_stage(task, options, draws, outcome) : set_stage(task, options, draws);
-  if (outcome == ActOutcome::kAborted)
-    perform_abort(staged.scene, draws);
-  else
-    act.perform(staged.scene, draws);
-  synthesis::look_away(staged.scene);
+  perform(definition_of(task).act, manner, outcome, staged, draws);
 
   InteractionClip clip;
-  clip.id = synthetic_clip_id(people ? "people" : "synth", to_string(task), options.seed, options.index);
+  clip.id = synthetic_clip_id(synthetic_manner(options.like), to_string(task), options.seed, options.index);
   clip.task = task;
   std::array<HumanMotion, 2> motions = render(staged.scene.people, staged.frames, options.rate_hz, staged.showing);
   clip.a = std::move(motions[0]);
@@ -102,11 +132,17 @@ InteractionClip synthesize(Task task, const SynthesisOptions& options) {
   clip.source["seed"] = std::to_string(options.seed);
   clip.source["index"] = std::to_string(options.index);
   if (people) {
-    clip.source["like"] = "people";
+    clip.source["like"] = kLikenessNames.at(static_cast<std::size_t>(options.like));
     clip.source["outcome"] = kActOutcomeNames.at(static_cast<std::size_t>(outcome));
   }
-  clip.source["side"] = staged.scene.cast.side == 0 ? "left" : "right";
-  return clip;
+  // The one who has the initiative is the robot's where nobody else acts.
+  if (staged.still) clip.reactor = Person::kA;
+  clip.source["side"] = (staged.scene.cast.side == 0) != mirror ? "left" : "right";
+  return mirror ? mirrored(clip) : clip;
+}
+
+std::string_view synthetic_manner(Likeness like) {
+  return like == Likeness::kScripted ? "synth" : kLikenessNames.at(static_cast<std::size_t>(like));
 }
 
 bool is_synthesised(const std::map<std::string, std::string>& source) {

@@ -15,6 +15,9 @@ void check_synthesis_options(Task task, const SynthesisOptions& options);
 // Checks them.
 InteractionClip synthesize(Task task, const SynthesisOptions& options);
 
+// The first word of the ids of such clips.
+std::string_view synthetic_manner(Likeness like);
+
 // Whether a clip's `source` says that synthesize() made it.
 bool is_synthesised(const std::map<std::string, std::string>& source);
 

@@ -62,6 +62,8 @@ Layout meeting_layout(const Participants& cast, double z, double share, double n
     ahead[k] = std::clamp(reach_ahead(cast.body[k], cast.side, z, share, lean), nearest, farthest);
   Layout layout;
   layout.distance = ahead[0] + ahead[1];
+  if (cast.manner.distance && *cast.manner.distance < layout.distance)
+    return meeting_at_distance(cast, z, *cast.manner.distance, lean);
   layout.meet = {ahead[0], 0.0, z};
   if (!cast.manner.rehearsed) meet_between(cast, ahead[0] / layout.distance, layout);
   for (const int k : {0, 1}) layout.lean[k] = lean_to_meet(cast, k, layout, lean, 0.93);
@@ -78,8 +80,8 @@ Layout meeting_at_distance(const Participants& cast, double z, double distance, 
   return layout;
 }
 
-Draws::Draws(std::uint64_t seed, Task task, int index)
-    : seed_(seed), task_(to_string(task)), index_(std::to_string(index)) {}
+Draws::Draws(std::uint64_t seed, Task task, int index, double breadth)
+    : seed_(seed), task_(to_string(task)), index_(std::to_string(index)), breadth_(breadth) {}
 
 Random Draws::stream(std::string_view quantity) const {
   return {seed_, stream_key({"synthesis", task_, index_, quantity})};
@@ -95,7 +97,8 @@ double Draws::uniform(const std::string& quantity, double low, double high, std:
 
 double Draws::styled(const std::string& quantity, double style, double low, double high) {
   const double share = std::clamp(style + stream(quantity).uniform(-0.2, 0.2), 0.0, 1.0);
-  const double value = low + (high - low) * share;
+  const double wider = share + breadth_ * (share - 0.5);
+  const double value = low + (high - low) * (breadth_ == 0.0 ? share : wider);
   record(quantity, value);
   return value;
 }
@@ -104,6 +107,12 @@ double Draws::spread(const std::string& quantity, const Deciles& deciles) {
   const double u = stream(quantity).uniform();
   const double value = u < 0.5 ? deciles.middle + (u - 0.5) / 0.4 * (deciles.middle - deciles.low)
                                : deciles.middle + (u - 0.5) / 0.4 * (deciles.high - deciles.middle);
+  record(quantity, value);
+  return value;
+}
+
+double Draws::memoryless(const std::string& quantity, double mean) {
+  const double value = -mean * std::log1p(-stream(quantity).uniform());
   record(quantity, value);
   return value;
 }

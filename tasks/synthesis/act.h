@@ -28,7 +28,8 @@ struct Deciles {
 
 class Draws {
  public:
-  Draws(std::uint64_t seed, Task task, int index);
+  // Ranges that follow the style are wider by `breadth` of their width.
+  Draws(std::uint64_t seed, Task task, int index, double breadth = 0.0);
 
   // Uniform in [low, high), or `given` where it is set.
   double uniform(const std::string& quantity, double low, double high, std::optional<double> given = {});
@@ -38,6 +39,9 @@ class Draws {
   // Through the 10, 50 and 90 % of a distribution, straight in between and a quarter of the last stretch beyond.
   double spread(const std::string& quantity, const Deciles& deciles);
   bool chance(const std::string& quantity, double probability, std::optional<bool> given = {});
+  // Exponential: how long it has lasted says nothing of how long it will.
+  double memoryless(const std::string& quantity, double mean);
+  [[nodiscard]] double breadth() const { return breadth_; }
   [[nodiscard]] Random stream(std::string_view quantity) const;
 
   void record(const std::string& quantity, double value);
@@ -48,6 +52,7 @@ class Draws {
   std::uint64_t seed_;
   std::string task_;
   std::string index_;
+  double breadth_;
   std::map<std::string, std::string> recorded_;
 };
 
@@ -56,6 +61,7 @@ struct MotionStyle {
   bool rehearsed = true;
   double tempo = 1.0;                   // how many times as fast the scene is played as it is planned
   std::optional<double> distance = {};  // of the roots in the act [m]; else the layout's own
+  std::optional<double> contact = {};   // of a touch that strikes, at tempo 1 [s]; else the act's own
   // For A and B: where each has the other when its feet stand for the act, from its own facing towards the acting hand,
   // and by how much it then turns away from there, the hand forward. [rad]
   std::array<double, 2> bearing = {0.0, 0.0}, turn = {0.0, 0.0};
@@ -78,6 +84,16 @@ struct RecordedManner {
   double left = 0.106;                  // share of acts with the left hand
   Deciles before = {0.5, 0.9, 1.4};     // what a recording has before the touch (a gesture's begin) [s]
   Deciles after = {0.2, 0.5, 1.0};      // and after it [s]
+  // Nothing of these where recordings of one source are followed:
+  Deciles height = {};      // of a body [m]; zeros: as for rehearsed people
+  Deciles contact = {};     // of a touch that strikes, as played [s]; zeros: the act's own
+  Deciles aside = {};       // of the hips from the trunk and the feet, to either side [rad]
+  Deciles stoop = {};       // at which the trunk rests, forward [rad]
+  double pause = 0.0;       // mean of a wait without memory between coming and acting [s]
+  double breadth = 0.0;     // Draws::breadth
+  double both_hands = 0.0;  // share of people who use the other hand, too
+  double mirrored = 0.0;    // share of clips that are turned into their mirror image
+  double still = 0.0;       // share of gestures before a partner who stands still
 };
 
 // The two people who take part, before anybody is placed.
@@ -124,7 +140,7 @@ struct Act {
   bool close;                // they stand so close that they must step back before they may turn
   Layout (*layout)(const Participants&, Draws&);
   void (*perform)(Scene&, Draws&);
-  RecordedManner recorded = {};
+  RecordedManner recorded = {}, varied = {};  // of clips like people, and of those that vary more
 };
 
 // Point of a person's frame (origin on the floor below the root, x forward) in W.

@@ -84,6 +84,8 @@ struct Performer {
   double reaction = 0.0;  // how much later than A this person begins things [s]
   double arm_swing = 0.7;
   bool meets_skin = false;  // hands stop at the partner's trunk and head
+  double aside = 0.0;       // of the hips to the left of trunk and feet, all the time [rad]
+  double stoop = 0.0;       // forward, at which the trunk rests [rad]
   Channel forward, side, twist, crouch, shift, hips;
   Channel look{1.0};  // 1: at the partner, 0: straight ahead
   Channel nod;        // of the head, forward [rad]

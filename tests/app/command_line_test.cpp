@@ -207,7 +207,7 @@ TEST(CommandLine, ClipsOfATrainingAreAMannerAndACount) {
   for (const char* kind : {"people", "people:0", "people:-3", "people:2.5", "people:x", "people:100001"})
     EXPECT_THAT(refusal(kind), HasSubstr(expected + "'" + kind + "'"));
   EXPECT_THAT(refusal("persons:3"),
-              HasSubstr("--clips: expected rehearsed or people before the ':', found 'persons:3'"));
+              HasSubstr("--clips: expected rehearsed or people or varied before the ':', found 'persons:3'"));
 }
 
 TEST(CommandLine, ListSaysWhatControllersAndPerturbationsAre) {

@@ -137,7 +137,9 @@ std::string origin_of(const DemonstrationOptions& options) {
   std::string clips;
   for (const auto& [like, per_task] : options.clips)
     clips += fmt::format("{}{}{}{}", clips.empty() ? "" : " and ", per_task, clips.empty() ? " clips of each task" : "",
-                         like == Likeness::kPeople ? " like people" : "");
+                         like == Likeness::kPeople   ? " like people"
+                         : like == Likeness::kVaried ? " that vary more"
+                                                     : "");
   clips += fmt::format(" (seed {}), retargeted by {}, {} start{} of each{}", options.seed, options.pair_mode,
                        options.starts, options.starts == 1 ? "" : "s",
                        options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");

@@ -72,7 +72,8 @@ FieldTable<PolicyTraining> demonstration_fields() {
   return {
       field<T>(
           {.name = "clips", .meaning = "synthesised clips of each task by whose way people have (docs/synthesis.md)"},
-          "rehearsed:N, people:N or both", [](const T& training) { return text_of(training.data.clips); }, read_clips),
+          "MANNER:N, of rehearsed, people and varied", [](const T& training) { return text_of(training.data.clips); },
+          read_clips),
       field<T>(
           {.name = "mode", .meaning = "of retargeting: paper, grounded or best"},
           [](auto& t) -> auto& { return t.data.pair_mode; }),

@@ -44,7 +44,7 @@ void run_synth(const Session& session, SynthArguments arguments) {
     SynthesisOptions options = arguments.options;
     options.index = arguments.options.index + i % arguments.count;
     InteractionClip clip = synthesize(tasks[i / arguments.count], options);
-    if (arguments.as_tracked) clip = add_tracker_noise(clip, {}, options.seed);
+    if (arguments.as_tracked) clip = add_tracker_noise(clip, tracker_of(clip, options.seed), options.seed);
     const std::string path = (std::filesystem::path(arguments.output) / (clip.id + ".npz")).string();
     save_clip(clip, path);
     written[i] = {{"file", path},
