@@ -207,6 +207,35 @@ Nearest nearest_embrace(const People& people, int t) {
 
 double lowest_of(const HumanMotion& person, int t) { return person.joints.frame(t).row(2).minCoeff(); }
 
+// How far from facing the other hips and ankles are.
+void add_sides(const People& people, int t, InteractionStatistics& result) {
+  result.hips_aside = result.ankles_aside = 0.0;
+  for (const int k : {0, 1}) {
+    const HumanMotion &one = *people[k], &other = *people[1 - k];
+    result.hips_aside = std::max(result.hips_aside, std::abs(bearing_of_other(one, other, t)));
+    const Eigen::Vector3d across = joint(one, t, kLeftAnkle) - joint(one, t, kRightAnkle);
+    const Eigen::Vector3d way = joint(other, t, kPelvis) - joint(one, t, kPelvis);
+    const double aside = turned(std::atan2(-across.x(), across.y()) - std::atan2(way.y(), way.x()));
+    result.ankles_aside = std::max(result.ankles_aside, std::abs(aside));
+  }
+}
+
+void add_posture(const People& people, InteractionStatistics& result) {
+  result.lean = 0.0;
+  result.raised = -std::numeric_limits<double>::infinity();
+  for (const HumanMotion* person : people) {
+    std::vector<double> lean, raised;
+    for (int t = 0; t < person->frames(); ++t) {
+      const Eigen::Vector3d up = joint(*person, t, kNeck) - joint(*person, t, kPelvis);
+      lean.push_back(std::atan2(up.head<2>().norm(), up.z()) * 180.0 / std::numbers::pi);
+      raised.push_back(std::max(joint(*person, t, kLeftHand).z(), joint(*person, t, kRightHand).z()) -
+                       joint(*person, t, kPelvis).z());
+    }
+    result.lean = std::max(result.lean, quantile(std::move(lean), 0.95));
+    result.raised = std::max(result.raised, quantile(std::move(raised), 0.95));
+  }
+}
+
 void add_touch(const InteractionClip& clip, const People& people, InteractionStatistics& result) {
   const ActSignal signal = definition_of(clip.task).phases.act;
   const bool hands = signal == ActSignal::kHandsTogether, embrace = signal == ActSignal::kHandAtChest;
@@ -236,6 +265,7 @@ void add_touch(const InteractionClip& clip, const People& people, InteractionSta
   for (const HumanMotion* person : people)
     result.turned_hips += 0.5 * turned(facing(*person, (first + last) / 2) - facing(*person, 0));
   result.touch_turn = std::abs(turned(facing(*people[0], first) - facing(*people[1], first) + std::numbers::pi));
+  add_sides(people, first, result);
   if (!hands && !embrace) return;
   result.touch_height = height / count;
   result.right_hands = 0.5 * right / count;
@@ -372,6 +402,7 @@ InteractionStatistics interaction_statistics(const InteractionClip& clip) {
   result.source_rate_hz = source_rate(clip);
   result.noise = noise_of(clip, people);
   add_bodies(people, result);
+  add_posture(people, result);
   return result;
 }
 
@@ -387,6 +418,10 @@ std::span<const InteractionStatisticInfo> interaction_statistic_catalogue() {
       {"touch_bearing", "The other is to the right by", "deg", &S::touch_bearing, false},
       {"turned_hips", "Turned to the left until mid-touch", "deg", &S::turned_hips, false},
       {"touch_turn", "Turned from facing each other", "deg", &S::touch_turn, false},
+      {"hips_aside", "Hips from facing the other", "deg", &S::hips_aside, false},
+      {"ankles_aside", "Ankles from facing the other", "deg", &S::ankles_aside, false},
+      {"lean", "Lean of the trunk p95", "deg", &S::lean, false},
+      {"raised", "Hand over the pelvis p95", "m", &S::raised, false},
       {"largest_distance", "Largest distance of the roots", "m", &S::largest_distance, false},
       {"touch_height", "Height of the touch", "m", &S::touch_height, false},
       {"approach_speed", "Closing speed of the roots", "m/s", &S::approach_speed, false},
@@ -422,7 +457,7 @@ StatisticSpread spread_of(std::span<const InteractionStatistics> clips, const In
   const int count = static_cast<int>(values.size());
   if (info.is_share) return {count, sum / count, sum / count, sum / count};
   std::ranges::sort(values);
-  return {count, quantile_of_sorted(values, 0.1), quantile_of_sorted(values, 0.5), quantile_of_sorted(values, 0.9)};
+  return {count, quantile_of_sorted(values, 0.05), quantile_of_sorted(values, 0.5), quantile_of_sorted(values, 0.95)};
 }
 
 bool agree(const StatisticSpread& one, const StatisticSpread& other, const InteractionStatisticInfo& info) {

@@ -62,6 +62,10 @@ struct InteractionStatistics {
   double touch_bearing = kUnknownStatistic;     // of the other from either's facing, to the right, mean of both [deg]
   double turned_hips = kUnknownStatistic;       // to the left, from the first frame to mid-touch, mean of both [deg]
   double touch_turn = kUnknownStatistic;        // by which the two do not face opposite ways then [deg]
+  double hips_aside = kUnknownStatistic;        // of the other from where hips face, at the touch, the larger [deg]
+  double ankles_aside = kUnknownStatistic;      // likewise from the line at right angles to that of the ankles [deg]
+  double lean = kUnknownStatistic;              // of pelvis to neck from upright, p95 over frames, the larger [deg]
+  double raised = kUnknownStatistic;            // of the higher hand over its pelvis, p95 over frames, the larger [m]
   double touch_height = kUnknownStatistic;      // of the touching hands over the lowest foot, mean in touch [m]
   double approach_speed = kUnknownStatistic;    // fastest closing of the roots over kApproachWindow [m/s]
   double root_speed_p95 = kUnknownStatistic;    // of either root over kApproachWindow, over frames, mean of both [m/s]
@@ -104,7 +108,7 @@ std::span<const InteractionStatisticInfo> interaction_statistic_catalogue();
 // The spread of one statistic over clips that have it.
 struct StatisticSpread {
   int clips = 0;
-  double low = 0.0, middle = 0.0, high = 0.0;  // 10 %, 50 %, 90 %; a share has its mean in all three; NaN for none
+  double low = 0.0, middle = 0.0, high = 0.0;  // 5 %, 50 %, 95 %; a share has its mean in all three; NaN for none
 };
 StatisticSpread spread_of(std::span<const InteractionStatistics> clips, const InteractionStatisticInfo& info);
 

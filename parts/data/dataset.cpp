@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 
 #include "duet/core/machine.h"
 #include "duet/core/require.h"
@@ -19,6 +20,7 @@
 #include "duet/datasets/people_clip.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/work/stop_token.h"
+#include "duet/metrics/motion_windows.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/plausibility.h"
@@ -381,34 +383,55 @@ InteractionSet interactions_of(const std::string& folder) {
   const std::vector<std::string> files = files_of(folder);
   InteractionSet set{.name = std::filesystem::path(folder).lexically_normal().filename().string(),
                      .tasks = std::vector<Task>(files.size(), Task::kHug),
-                     .clips = std::vector<InteractionStatistics>(files.size())};
+                     .clips = std::vector<InteractionStatistics>(files.size()),
+                     .windows = std::vector<std::vector<std::vector<double>>>(files.size())};
   parallel_for_each(static_cast<int>(files.size()), default_threads(), [&](int i) {
     const InteractionClip clip = load_clip(files[i]);
     set.tasks[i] = clip.task;
     set.clips[i] = interaction_statistics(clip);
+    set.windows[i] = motion_windows(clip);
   });
   return set;
 }
 
-// Tables of people, one a task; with a second set those of tasks that both have.
-void add_interactions(const std::string& folder, const std::string& against, std::string& text, nlohmann::json& json) {
-  const InteractionSet set = interactions_of(folder);
-  const InteractionSet other = against.empty() ? InteractionSet{} : interactions_of(against);
-  for (const Task task : all_tasks()) {
-    if (set.of(task).empty() || (!against.empty() && other.of(task).empty())) continue;
-    const TextTable table = against.empty() ? interaction_table(set, task) : interaction_table(set, other, task);
-    text += markdown_table(table) + "\n";
-    nlohmann::json& entry = json["interactions"][std::string(to_string(task))];
-    entry = {{"header", table.header}, {"rows", table.rows}};
-    if (against.empty()) continue;
-    const InteractionAgreement found = interaction_agreement(set, other, task);
+nlohmann::json json_of(const TextTable& table) { return {{"header", table.header}, {"rows", table.rows}}; }
+
+// The tables of one task: each set beside the others, and how well they are told apart.
+void add_task(std::span<const InteractionSet> sets, Task task, std::string& text, nlohmann::json& entry) {
+  const bool pair = sets.size() == 2;
+  const TextTable table = pair ? interaction_table(sets[0], sets[1], task) : interaction_table(sets, task);
+  text += markdown_table(table) + "\n";
+  entry = json_of(table);
+  if (sets.size() == 1) return;
+  if (pair) {
+    const InteractionAgreement found = interaction_agreement(sets[0], sets[1], task);
     text += fmt::format("{}: {} of {} statistics within {:.0f} %\n\n", to_string(task), found.agreeing, found.compared,
                         100.0 * kAgreement);
     entry["agreeing"] = found.agreeing;
     entry["compared"] = found.compared;
   }
+  const TextTable apart = told_apart_table(sets, task);
+  const std::string by = told_by(sets, task);
+  text += markdown_table(apart) + "\n" + by + (by.empty() ? "" : "\n");
+  entry["told_apart"] = json_of(apart);
+  entry["told_by"] = by;
+}
+
+// Tables of people, one a task; with other sets those of tasks that the first and one of them have.
+void add_interactions(const std::string& folder, const std::vector<std::string>& against, std::string& text,
+                      nlohmann::json& json) {
+  std::vector<InteractionSet> sets = {interactions_of(folder)};
+  for (const std::string& other : against) sets.push_back(interactions_of(other));
+  for (const Task task : all_tasks()) {
+    if (sets[0].of(task).empty()) continue;
+    std::vector<InteractionSet> having;
+    for (const InteractionSet& set : sets)
+      if (!set.of(task).empty()) having.push_back(set);
+    if (!against.empty() && having.size() == 1) continue;
+    add_task(having, task, text, json["interactions"][std::string(to_string(task))]);
+  }
   if (!json.contains("interactions"))
-    throw InputError(fmt::format("'{}' and '{}' have no task in common", folder, against));
+    throw InputError(fmt::format("'{}' and '{}' have no task in common", folder, fmt::join(against, "', '")));
 }
 
 void add_entries(const std::vector<DatasetEntry>& entries, std::string& text, nlohmann::json& json) {
@@ -423,7 +446,7 @@ void add_entries(const std::vector<DatasetEntry>& entries, std::string& text, nl
 }
 
 // Prints the statistics; for a data set its own tables, too, unless it is held against another.
-void run_stats(const Session& session, const std::string& folder, const std::string& against) {
+void run_stats(const Session& session, const std::string& folder, const std::vector<std::string>& against) {
   const bool made = is_dataset(folder);
   const std::vector<DatasetEntry> entries =
       made && against.empty() ? read_dataset(folder) : std::vector<DatasetEntry>{};
@@ -443,11 +466,12 @@ void run_stats(const Session& session, const std::string& folder, const std::str
 void add_dataset_stats(CLI::App& dataset, Session& session) {
   CLI::App* command = add_command(dataset, session, "stats", "the tables of a data set, and how its people interact",
                                   "duet dataset stats data\n"
-                                  "  duet dataset stats clips --against recorded");
+                                  "  duet dataset stats clips --against recorded others");
   auto folder = std::make_shared<std::string>();
-  auto against = std::make_shared<std::string>();
+  auto against = std::make_shared<std::vector<std::string>>();
   command->add_option("folder", *folder, "a data set, or a folder of clips of two people")->required();
-  command->add_option("--against", *against, "another one, to hold the interactions of the first against");
+  command->add_option("--against", *against,
+                      "others, to hold the interactions of the first against, and to tell them apart");
   command->callback([&session, folder, against] { run_stats(session, *folder, *against); });
 }
 

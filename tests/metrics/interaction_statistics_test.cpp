@@ -221,9 +221,9 @@ TEST(InteractionStatistics, SpreadsAgreeWithinAFifth) {
   clips.push_back({});  // has none
   const StatisticSpread spread = spread_of(clips, time);
   EXPECT_EQ(spread.clips, 11);
-  EXPECT_DOUBLE_EQ(spread.low, 1.0);
+  EXPECT_DOUBLE_EQ(spread.low, 0.5);
   EXPECT_DOUBLE_EQ(spread.middle, 5.0);
-  EXPECT_DOUBLE_EQ(spread.high, 9.0);
+  EXPECT_DOUBLE_EQ(spread.high, 9.5);
   EXPECT_NEAR(spread_of(clips, share).middle, 1.0 / 12.0, 1e-12);
   EXPECT_EQ(spread_of({}, time).clips, 0);
   const auto middle = [](double value) { return StatisticSpread{1, value, value, value}; };
