@@ -1,4 +1,4 @@
-// What the three modules share: the torque law as torques for a world that takes nothing else, which links may touch,
+// The modules share this: the torque law as torques for a world that takes nothing else, which links may touch,
 // and the form in which contacts are reported. Scenes, rows and solvers are each engine's own.
 #pragma once
 
@@ -18,9 +18,11 @@ namespace own {
 
 class OwnWorld : public duet::PhysicsBackend {
  protected:
-  explicit OwnWorld(const duet::Scene& scene)
+  // `law_step`: at which the law is asked, where that is not once a step [s].
+  explicit OwnWorld(const duet::Scene& scene) : OwnWorld(scene, scene.dt) {}
+  OwnWorld(const duet::Scene& scene, double law_step)
       : PhysicsBackend(scene),
-        law_(scene),
+        law_(at_step(scene, law_step)),
         links_(static_cast<int>(scene.robot->links.size())),
         touching_(links_ * links_, 0),
         applied_(Eigen::VectorXd::Zero(scene.robot->dof())),
@@ -43,15 +45,13 @@ class OwnWorld : public duet::PhysicsBackend {
   // acceleration, with the contact forces of the step before. False where the state has diverged.
   [[nodiscard]] bool find_torques(const duet::JointCommand& command) {
     if (!law_.begin(state_, command)) return false;
-    Q_ = of_contacts_;
-    for (int link = 0; link < links_; ++link) {
-      const duet::ExternalForces::Push& push = pushes_.all()[link];
-      if (!push.f_W.isZero(0.0)) add_force(link, law_.kinematics().X_WL(link) * push.p_L, push.f_W);
-    }
-    law_.solve(Q_);
-    law_.equivalent_torques(law_.acceleration(), applied_);
-    law_.torques(law_.acceleration(), torques_);
-    return applied_.allFinite();
+    return solve_law();
+  }
+  // The same inside a step, where contacts_ are those of `state`.
+  [[nodiscard]] bool find_torques(const duet::RobotState& state, const duet::JointCommand& command) {
+    if (!law_.begin(state, command)) return false;
+    end_contacts();
+    return solve_law();
   }
   [[nodiscard]] const Eigen::VectorXd& applied() const { return applied_; }
 
@@ -99,6 +99,21 @@ class OwnWorld : public duet::PhysicsBackend {
   }
 
  private:
+  static duet::Scene at_step(duet::Scene scene, double step) {
+    scene.dt = step;
+    return scene;
+  }
+  bool solve_law() {
+    Q_ = of_contacts_;
+    for (int link = 0; link < links_; ++link) {
+      const duet::ExternalForces::Push& push = pushes_.all()[link];
+      if (!push.f_W.isZero(0.0)) add_force(link, law_.kinematics().X_WL(link) * push.p_L, push.f_W);
+    }
+    law_.solve(Q_);
+    law_.equivalent_torques(law_.acceleration(), applied_);
+    law_.torques(law_.acceleration(), torques_);
+    return applied_.allFinite();
+  }
   void add_force(int link, const Eigen::Vector3d& p_W, const Eigen::Vector3d& f_W) {
     law_.kinematics().point_jacobian(link, p_W, J_);
     Q_.noalias() += J_.transpose() * f_W;
