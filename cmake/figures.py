@@ -23,7 +23,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TASKS = {"hug": "Hug", "handshake": "Handshake", "high_five": "High-five", "wave": "Wave", "bend": "Bend", "fly_kiss": "Fly-kiss"}
 ENGINES = {"mujoco": "MuJoCo", "bullet": "Bullet", "ode": "ODE", "simbody": "Simbody", "dart": "DART"}
-WORLDS = {**ENGINES, "bullet_own": "Bullet, own world", "dart_own": "DART, own world", "ode_own": "ODE, own world"}
+WORLDS = {**ENGINES, "mujoco3": "MuJoCo 3.14", "physx": "PhysX 5.6", "bullet_own": "Bullet, own world", "dart_own": "DART, own world", "ode_own": "ODE, own world"}
 POLICIES = {
     "dstar": "dstar",
     "dp": "dp",

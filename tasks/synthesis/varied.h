@@ -1,6 +1,6 @@
-// The manner of people who vary at least as much as those of SBU, K3HI and Kinder together (docs/synthesis.md): left
-// hands as often as right ones, hips that face elsewhere, near and far, quick and slow, and gestures that nobody
-// announces. A task's file puts its own figures over these.
+// The manner of people who vary nearly as much as those of SBU, K3HI and Kinder together (docs/synthesis.md says where
+// less): left hands as often as right ones, hips that face elsewhere, near and far, quick and slow, and gestures that
+// nobody announces. A task's file puts its own figures over these.
 #pragma once
 
 #include "duet/tasks/synthesis/act.h"
