@@ -38,7 +38,8 @@ InteractionAgreement interaction_agreement(const InteractionSet& set, const Inte
 // and the largest of several draws): by the statistics of a clip (but for the rate of the recording, which nobody
 // sees), and by short windows of either person's motion. "-" where one side has fewer than kFewestToTell clips.
 TextTable told_apart_table(std::span<const InteractionSet> sets, Task task);
-// What the first set is known by: a sentence each of statistics and windows; "" where nothing was compared.
+// The features by which the first set is known: a sentence each of statistics and windows; "" where nothing was
+// compared.
 std::string told_by(std::span<const InteractionSet> sets, Task task);
 
 }  // namespace duet

@@ -132,6 +132,11 @@ std::vector<RestartInstant> restarts_of(const EpisodeRuns& runs, const Recording
   return instants;
 }
 
+void add(Restarts& sum, const Restarts& more) {
+  sum.failed += more.failed;
+  sum.ran += more.ran;
+}
+
 Restarts of_own(const RestartInstant& instant, const std::string& own) {
   const auto found = instant.engines.find(own);
   return found == instant.engines.end() ? Restarts{} : found->second;
@@ -140,11 +145,8 @@ Restarts of_own(const RestartInstant& instant, const std::string& own) {
 // Over all restarts in engines but `own`.
 Restarts of_others(const RestartInstant& instant, const std::string& own) {
   Restarts others;
-  for (const auto& [engine, of] : instant.engines) {
-    if (engine == own) continue;
-    others.failed += of.failed;
-    others.ran += of.ran;
-  }
+  for (const auto& [engine, of] : instant.engines)
+    if (engine != own) add(others, of);
   return others;
 }
 
@@ -158,12 +160,10 @@ double share_of_others(const RestartInstant& instant, const std::string& own) {
 double own_engine_p(const std::vector<RestartInstant>& instants, const std::string& own) {
   Restarts mine, others;
   for (const RestartInstant& instant : instants) {
-    const Restarts theirs = of_others(instant, own), ours = of_own(instant, own);
+    const Restarts theirs = of_others(instant, own);
     if (!(theirs.share() < kMostly)) continue;
-    mine.failed += ours.failed;
-    mine.ran += ours.ran;
-    others.failed += theirs.failed;
-    others.ran += theirs.ran;
+    add(mine, of_own(instant, own));
+    add(others, theirs);
   }
   return fisher_exact_greater(mine.failed, mine.ran, others.failed, others.ran);
 }

@@ -136,7 +136,7 @@ double area_within_folds(const std::vector<double>& scores, const std::vector<bo
   return area / pairs;
 }
 
-// Of the area, over draws of as many clusters of either group as there are.
+// The interval of the area, over draws of as many clusters of either group as there are.
 Interval resampled(std::span<const GroupedSample> samples, const std::vector<double>& scores,
                    const std::map<int, int>& fold, std::uint64_t seed) {
   std::array<std::map<int, std::vector<std::size_t>>, 2> of;

@@ -82,19 +82,21 @@ std::vector<std::string> actuation_notes(const Suite& suite, const std::string& 
 }
 
 void require_bearable_law(const Suite& suite) {
-  for (const std::string& engine : suite.engines) {
-    if (engine == kPlaybackEngine) continue;
-    const EngineSettings settings = suite.profile.settings(engine);
-    if (settings.law != TorqueLaw::kExplicit) continue;
-    for (const SuiteController& controller : suite.controllers) {
-      const std::shared_ptr<const RobotModel> robot = load_shared_robot(suite.card_of(controller));
-      ExplicitStep step;
-      try {
-        step = step_with(robot, standing_gains(*make_controller(controller.use, robot, controller.options), *robot),
-                         settings.armature);
-      } catch (const MissingError&) {
-        continue;
-      }
+  std::vector<std::pair<std::string, EngineSettings>> driven;  // engines under an explicit law
+  for (const std::string& engine : suite.engines)
+    if (engine != kPlaybackEngine && suite.profile.settings(engine).law == TorqueLaw::kExplicit)
+      driven.emplace_back(engine, suite.profile.settings(engine));
+  if (driven.empty()) return;
+  for (const SuiteController& controller : suite.controllers) {
+    const std::shared_ptr<const RobotModel> robot = load_shared_robot(suite.card_of(controller));
+    JointGains gains;
+    try {
+      gains = standing_gains(*make_controller(controller.use, robot, controller.options), *robot);
+    } catch (const MissingError&) {
+      continue;
+    }
+    for (const auto& [engine, settings] : driven) {
+      const ExplicitStep step = step_with(robot, gains, settings.armature);
       if (settings.dt <= kShakesBeyond * step.largest) continue;
       throw InputError(fmt::format(
           "suite '{0}': law of engine '{1}': expected a step of at most {2:.2g} ms for the explicit law {3} under "

@@ -1,4 +1,4 @@
-// What the explicit torque law bears of a controller: the largest physics steps by its gains on its robot, one sentence
+// The steps that the explicit torque law bears under a controller, by its gains on its robot; one sentence
 // where an episode's settings are beyond them, and a refusal where a whole suite's are. Found from the mass matrix
 // before any episode runs (robots/explicit_step.h).
 #pragma once

@@ -85,7 +85,7 @@ Phases phases_of(const PlannedScene& staged, double rate_hz) {
 
 namespace {
 
-// What is asked of a clip's side and angle, as it is before the clip is turned into its mirror image.
+// The side and angle that are asked for, as they are before the clip is turned into its mirror image.
 SynthesisOptions before_mirror(SynthesisOptions options) {
   if (options.side) options.side = *options.side == Side::kLeft ? Side::kRight : Side::kLeft;
   if (options.angle) options.angle = -*options.angle;

@@ -20,7 +20,7 @@ InteractionClip varied(Task task, SynthesisOptions options = {}) {
   return synthesize(task, options);
 }
 
-// What was drawn of a quantity, over clips of a task.
+// The values drawn of a quantity, over clips of a task.
 std::vector<double> drawn(Task task, const std::string& quantity, int clips, SynthesisOptions options = {}) {
   std::vector<double> values;
   options.rate_hz = 20.0;
