@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <unordered_map>
 
 #include "duet/core/names.h"
 #include "duet/core/recording.h"
@@ -339,16 +340,39 @@ std::vector<JointRecipe::Part> face_of(const BodyColumns& columns) {
 namespace {
 
 constexpr std::string_view kSeparators = " _.-|";
+constexpr std::size_t kLongestPrefix = 256;  // characters; more is no prefix of joints' names
 
 std::string after_colon(const std::string& name) {
   const std::size_t colon = name.rfind(':');
   return colon == std::string::npos ? name : name.substr(colon + 1);
 }
 
-// A root may be called as the prefix of the others is ("Bip01", "Bip01
-// Pelvis").
-bool has_prefix(const std::string& name, std::string_view prefix) {
-  return name.starts_with(prefix) || name == prefix.substr(0, prefix.size() - 1);
+// Every beginning of a name up to a separator, shortest first.
+std::vector<std::string_view> prefixes_of(std::string_view name) {
+  std::vector<std::string_view> prefixes;
+  name = name.substr(0, kLongestPrefix);
+  for (std::size_t at = name.find_first_of(kSeparators); at != std::string_view::npos;
+       at = name.find_first_of(kSeparators, at + 1))
+    prefixes.push_back(name.substr(0, at + 1));
+  return prefixes;
+}
+
+// The longest prefix that four of five names have. A root may be called as the prefix of the others is ("Bip01",
+// "Bip01 Pelvis").
+std::string_view shared_prefix(const std::vector<std::string>& names) {
+  std::unordered_map<std::string_view, int> having, called;
+  for (const std::string& name : names) {
+    ++called[name];
+    for (const std::string_view prefix : prefixes_of(name)) ++having[prefix];
+  }
+  std::string_view longest;
+  for (const auto& [prefix, count] : having) {
+    const auto root = called.find(prefix.substr(0, prefix.size() - 1));
+    const std::ptrdiff_t sharing = count + (root == called.end() ? 0 : root->second);
+    const bool longer = prefix.size() > longest.size() || (prefix.size() == longest.size() && prefix < longest);
+    if (longer && 5 * sharing >= 4 * std::ssize(names)) longest = prefix;
+  }
+  return longest;
 }
 
 // "LeftHand" in quotes or not, without the comment behind it.
@@ -365,16 +389,7 @@ std::string plain_value(std::string_view text) {
 std::vector<std::string> without_prefix(const std::vector<std::string>& names) {
   std::vector<std::string> plain;
   for (const std::string& name : names) plain.push_back(after_colon(name));
-  std::string longest;
-  for (const std::string& name : plain)
-    for (std::size_t at = name.find_first_of(kSeparators); at != std::string::npos;
-         at = name.find_first_of(kSeparators, at + 1)) {
-      const std::string prefix = name.substr(0, at + 1);
-      if (prefix.size() <= longest.size()) continue;
-      const auto sharing = std::count_if(plain.begin(), plain.end(),
-                                         [&](const std::string& other) { return has_prefix(other, prefix); });
-      if (5 * sharing >= 4 * std::ssize(plain)) longest = prefix;
-    }
+  const std::string longest(shared_prefix(plain));
   if (longest.empty()) return plain;
   for (std::string& name : plain)
     if (name.size() > longest.size() && name.starts_with(longest)) name.erase(0, longest.size());

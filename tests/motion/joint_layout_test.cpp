@@ -2,6 +2,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/motion/layouts/joint_recipes.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/support.h"
 
@@ -35,6 +36,15 @@ TEST(JointLayout, APrefixThatAllNamesShareSaysNothing) {
     for (int j = 0; j < kSmplJoints; ++j)
       EXPECT_EQ(found.smpl[j].parts[0].column, plain.smpl[j].parts[0].column) << prefix << kSmplNames[j];
   }
+}
+
+TEST(JointLayout, APrefixIsFoundAmongManyNamesAndLongOnes) {
+  std::vector<std::string> names;
+  for (int i = 0; i < 60000; ++i) names.push_back("rig_" + std::to_string(i) + "_joint.a-b|c d");
+  names.emplace_back(1 << 20, '_');
+  const std::vector<std::string> plain = without_prefix(names);
+  EXPECT_EQ(plain[7], "7_joint.a-b|c d");
+  EXPECT_EQ(plain.back(), names.back());
 }
 
 TEST(JointLayout, AFileOfNamesMapsTheColumnsOfAFile) {
