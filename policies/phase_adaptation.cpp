@@ -41,6 +41,7 @@ void check(const RobotMotion& motion, const Phases& phases, const RobotModel& ro
   check_option("lead", options.lead);
   check_option("return_time", options.return_time);
   check_option("mild_yaw", options.mild_yaw);
+  check_option("walks", options.walks);
 }
 
 // `offset` from `pose`, uniform over the disc of `radius` in the ground plane.
@@ -104,8 +105,13 @@ class Adaptation {
 
 AdaptedMotion adapt_approach(RobotMotion motion, const Phases& phases, const RobotModel& robot,
                              const AdaptationOptions& options, std::uint64_t seed) {
-  walk_straight(motion, phases, displaced(motion.root.front(), options.start_radius, seed));
-  raise_upper_body(motion, phases, robot, phases.act_begin);
+  const Pose start = displaced(motion.root.front(), options.start_radius, seed);
+  if (options.walks > 0.0) {
+    walk_and_wait(motion, phases, robot, start, options.walks);
+  } else {
+    walk_straight(motion, phases, start);
+    raise_upper_body(motion, phases, robot, phases.act_begin);
+  }
   lower_upper_body(motion, phases, robot, options.return_time * kTickRate);
   hold_frame(motion, robot, phases.act_end, motion.frames(), phases.act_end - 1);
   return {std::move(motion), phases, 0};

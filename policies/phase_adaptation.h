@@ -33,6 +33,7 @@ struct AdaptationOptions {
   double lead = 1.0;                // of neutral-to-act ramp kept before the act with kAct [s]
   double return_time = 1.0;         // over which the upper body goes back to neutral after the act [s]
   double mild_yaw = kSimToRealYaw;  // kSimToReal: largest turn of the root on its way to the act [rad]
+  double walks = 0.0;  // kApproach: its speed [m/s], so that it is there early and waits; 0: arrives as the act begins
   bool hold_stance = true;  // kAct: legs stay in the standing pose, the pelvis keeps its act position on the ground
   bool keep_torso = true;   // kAct with hold_stance: the waist takes over, inside its limits, what the pelvis loses of
                             // its turn and tilt, so that the torso is oriented as in the clip; false: waist as in the
@@ -44,7 +45,9 @@ struct AdaptationOptions {
 // the motion to the bit. kApproach: act to the bit. Before it the root goes from a start drawn uniformly from the disc
 // around the clip's start
 //   (height and orientation as there) straight to the first act frame, the upper body from neutral; legs as in the
-//   clip. After it root and legs stay as in the last act frame, the upper body goes back to neutral.
+//   clip. After it root and legs stay as in the last act frame, the upper body goes back to neutral. With `walks` it is
+//   there as soon as that speed allows, waits as in the first act frame with a neutral upper body, and the upper body
+//   comes into the act over its first 0.4 s.
 // kAct: the clip from `lead` before the act on (all of it, where the preparation is shorter). With hold_stance the root
 //   stands upright at x, y and yaw of the act's middle frame at the robot's standing height, legs standing; the upper
 //   body goes from neutral to the first act frame, through the act and back. Without hold_stance root and legs wait in

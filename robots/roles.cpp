@@ -119,6 +119,26 @@ void walk_straight(RobotMotion& motion, const Phases& phases, const Pose& start)
     motion.root[static_cast<std::size_t>(t)] = interpolate(start, goal, static_cast<double>(t) / phases.act_begin);
 }
 
+void walk_and_wait(RobotMotion& motion, const Phases& phases, const RobotModel& robot, const Pose& start,
+                   double speed) {
+  constexpr double kQuickest = 1.0, kTurn = 0.8;  // [s], [rad/s]
+  constexpr int kIntoAct = 20;                    // frames
+  const Pose goal = motion.root[static_cast<std::size_t>(phases.act_begin)];
+  const double seconds =
+      std::max({kQuickest, (goal.p - start.p).head<2>().norm() / speed, goal.R.angularDistance(start.R) / kTurn});
+  const int arrives = static_cast<int>(std::min<double>(phases.act_begin, std::ceil(seconds * motion.rate_hz)));
+  hold_frame(motion, robot, arrives, phases.act_begin, phases.act_begin);
+  walk_straight(motion, {arrives, phases.act_end}, start);
+  const int into = std::min(kIntoAct, phases.act_end - phases.act_begin);
+  for (const int j : upper_joints(robot)) {
+    motion.q.row(j).head(phases.act_begin).setConstant(robot.neutral[j]);
+    for (int t = 0; t < into; ++t) {
+      double& angle = motion.q(j, phases.act_begin + t);
+      angle = std::lerp(robot.neutral[j], angle, static_cast<double>(t) / kIntoAct);
+    }
+  }
+}
+
 void raise_upper_body(RobotMotion& motion, const Phases& phases, const RobotModel& robot, int frames) {
   const std::vector<int> upper = upper_joints(robot);
   const Eigen::VectorXd goal = motion.q.col(phases.act_begin);

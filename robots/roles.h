@@ -56,6 +56,11 @@ inline constexpr double kSimToRealYaw = 0.35;  // "milder yaw" of section D, whi
 // Preparation: the root from `start` straight to the first act frame, at an even pace.
 void walk_straight(RobotMotion& motion, const Phases& phases, const Pose& start);
 
+// Preparation: the root from `start` straight to the first act frame at up to `speed` [m/s], where root and legs wait
+// as in that frame; the upper body is neutral, and comes into the act over the act's first 0.4 s. So neither where the
+// robot is nor where its arms are tells that the act is about to begin.
+void walk_and_wait(RobotMotion& motion, const Phases& phases, const RobotModel& robot, const Pose& start, double speed);
+
 // Preparation: the upper body from neutral to the first act frame over the last `frames`, at most all of it.
 void raise_upper_body(RobotMotion& motion, const Phases& phases, const RobotModel& robot, int frames);
 

@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <vector>
 
+#include "duet/metrics/detector.h"
+#include "duet/metrics/interaction.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
@@ -101,6 +104,56 @@ TEST(MakeDemonstrations, ForTheRealRobotAreThoseOfAlgorithm7) {
   // Arms down, all the way up to 16 frames before the act.
   EXPECT_EQ(set.reference(0).q.tail(14), set.reference(first.phases.act_begin - 16).q.tail(14));
   EXPECT_NE(set.reference(0).q.tail(14), set.reference(first.phases.act_begin - 8).q.tail(14));
+}
+
+// The first frame in which somebody's hand is a fifth of an arm over its lowest place so far and stays there.
+std::optional<int> begins(const Agent& agent) { return act_onset(ActOnset::kHandRises, agent); }
+
+TEST(MakeDemonstrations, InAnswerTheRobotBeginsAfterItsPartner) {
+  DemonstrationOptions options = small_options();
+  options.engine = "";
+  options.clips = {{Likeness::kPeople, 6}};
+  options.answers = true;
+  const DemonstrationSet set = made(options);
+  EXPECT_THAT(set.origin, testing::HasSubstr("2 starts of each in answer to the partner, none followed"));
+  int both = 0;
+  for (const Demonstration& entry : set.list) {
+    if (entry.task != Task::kHandshake && entry.task != Task::kHighFive && entry.task != Task::kWave) continue;
+    RobotMotion robot{kTickRate, test::g1()->joint_names(), {}, Eigen::MatrixXd(test::g1()->dof(), entry.frames)};
+    PointTracks partner(entry.frames, kSmplJoints);
+    for (int t = 0; t < entry.frames; ++t) {
+      const Reference meant = set.reference(entry.begin + t);
+      robot.root.push_back(meant.X_WB);
+      robot.q.col(t) = meant.q;
+      partner.frame(t) = set.partner.col(entry.begin + t).cast<double>().reshaped(3, kSmplJoints);
+    }
+    const std::optional<int> own = begins(robot_agent(*test::g1(), robot)), other = begins(human_agent(partner));
+    if (!own || !other) continue;
+    ++both;
+    EXPECT_GE(*own - *other, 6) << entry.clip_id;  // 0.15 s, less what single precision moves an onset by
+    // It is there before the act and waits.
+    const int act = entry.phases.act_begin;
+    EXPECT_EQ(set.reference(entry.begin + act).X_WB.p, set.reference(entry.begin + act - 5).X_WB.p) << entry.clip_id;
+  }
+  EXPECT_GE(both, 18);  // of 36; hands are half up in the first frame of some recordings
+}
+
+TEST(MakeDemonstrations, BeforeAStillPartnerNobodyBeginsUntilHeHasLookedForFiveSeconds) {
+  DemonstrationOptions options = small_options();
+  options.engine = "";
+  options.starts = 1;
+  options.clips = {{Likeness::kVaried, 8}};
+  const DemonstrationSet set = made(options);
+  int still = 0;
+  for (const Demonstration& entry : set.list) {
+    const auto partner = set.partner.middleCols(entry.begin, entry.frames);
+    const float moved = (partner.colwise() - partner.col(0)).cwiseAbs().maxCoeff();
+    if (moved > 0.15F) continue;  // he breathes and shifts his weight
+    ++still;
+    EXPECT_GE(entry.phases.act_begin, 240) << entry.clip_id;
+  }
+  EXPECT_GE(still, 6);  // half of 24 gestures
+  EXPECT_LE(still, 18);
 }
 
 TEST(MakeDemonstrations, PeopleWaitForNoLengthThatCouldBeCounted) {

@@ -91,6 +91,26 @@ TEST(ApproachAdaptation, GoesStraightFromNeutralToTheAct) {
   }
 }
 
+TEST(ApproachAdaptation, WhoWalksIsThereEarlyAndWaitsWithItsArmsDown) {
+  const RobotMotion motion = swinging_motion(kFrames, 2);
+  const RobotMotion result = adapted(motion, {.walks = 1e3}).motion;  // there after the quickest way, one second
+  constexpr int kThere = 50;
+  ASSERT_GT(kPhases.act_begin, kThere + 1);
+  const Pose& goal = motion.root[kPhases.act_begin];
+  EXPECT_GT((result.root[kThere / 2].p - goal.p).norm(), 1e-3);
+  std::vector<int> arms;
+  for (int j = 0; j < g1()->dof(); ++j)
+    if (!test::is_leg(j)) arms.push_back(j);
+  for (int t = 0; t < kPhases.act_begin; ++t) {
+    if (t >= kThere) {
+      EXPECT_EQ(result.root[static_cast<std::size_t>(t)].p, goal.p) << t;
+    }
+    for (const int j : arms) EXPECT_EQ(result.q(j, t), g1()->neutral[j]) << t;
+  }
+  for (const int j : arms) EXPECT_EQ(result.q(j, kPhases.act_begin + 20), motion.q(j, kPhases.act_begin + 20));
+  EXPECT_THROW(adapted(motion, {.walks = -1.0}), std::invalid_argument);
+}
+
 TEST(ApproachAdaptation, StandsStillAfterTheActAndReturnsToNeutral) {
   const RobotMotion motion = swinging_motion(kFrames, 3);
   const RobotMotion result = adapted(motion, {.return_time = 1.2}).motion;

@@ -11,6 +11,8 @@
 #include "duet/core/machine.h"
 #include "duet/core/numbers.h"
 #include "duet/experiment/plan/clips.h"
+#include "duet/metrics/detector.h"
+#include "duet/metrics/interaction.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/phase_adaptation.h"
@@ -22,6 +24,8 @@ namespace {
 
 constexpr std::size_t kBeforeFall = 50;  // frames
 constexpr int kShortest = 100;
+constexpr double kQuickReaction = 0.15, kSlowReaction = 0.3;  // [s]
+constexpr double kSlowWalk = 0.25, kQuickWalk = 0.5;          // [m/s]
 
 // One motion to be followed, beside its partner.
 struct Take {
@@ -31,12 +35,34 @@ struct Take {
   std::vector<RobotState> followed;  // in the engine, while it was upright
 };
 
-Take take_of(const PairedMotion& clip, const RobotModel& robot, StartMode start, std::uint64_t seed) {
+// Frames by which the partner has to be ahead of the clip for the robot to begin a reaction after him. Nobody answers a
+// partner who does not move, nor in a task whose act has no beginning to see.
+int ahead(const PairedMotion& clip, const RobotMotion& motion, const RobotModel& robot, Random& random) {
+  const double reaction = random.uniform(kQuickReaction, kSlowReaction);
+  const ActOnset onset = definition_of(clip.task).interaction.onset;
+  const std::optional<int> partner = act_onset(onset, human_agent(clip.partner.joints));
+  const std::optional<int> own = act_onset(onset, robot_agent(robot, motion));
+  if (!partner || !own) return 0;
+  return std::max(0, *partner + static_cast<int>(std::lround(reaction * kTickRate)) - *own);
+}
+
+// Frames of a track from `begin` on; the last one stays where there are no more.
+PointTracks frames_from(const PointTracks& track, int begin, int frames) {
+  PointTracks cut(frames, track.points());
+  for (int t = 0; t < frames; ++t) cut.frame(t) = track.frame(std::min(begin + t, track.frames() - 1));
+  return cut;
+}
+
+Take take_of(const PairedMotion& clip, const RobotModel& robot, const DemonstrationOptions& options,
+             std::uint64_t seed) {
   Take take;
   take.clip = &clip;
-  take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, {.start = start}, seed);
-  const int begin = take.adapted.clip_frame, frames = take.adapted.motion.frames();
-  take.partner = clip.partner.joints.slice(begin, begin + frames);
+  Random random(seed, stream_key({"answers"}));
+  AdaptationOptions adaptation{.start = options.start};
+  if (options.answers) adaptation.walks = random.uniform(kSlowWalk, kQuickWalk);
+  take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, adaptation, seed);
+  if (options.answers) take.adapted.clip_frame += ahead(clip, take.adapted.motion, robot, random);
+  take.partner = frames_from(clip.partner.joints, take.adapted.clip_frame, take.adapted.motion.frames());
   return take;
 }
 
@@ -109,7 +135,7 @@ bool demonstrate(Task task, const DemonstrationClips& kind, const PairOptions& p
   parallel_for_each(static_cast<int>(made.size()), options.threads, [&](int i) {
     if (by.stop()) return;
     const PairedMotion& clip = clips[i / starts];
-    made[i] = take_of(clip, *by.robot, options.start, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
+    made[i] = take_of(clip, *by.robot, options, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
     const bool followed = !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
     if (followed) follow(*made[i], by.robot, options, by.make_policy, by.make_controller);
     by.progress.advance();
@@ -142,7 +168,9 @@ std::string origin_of(const DemonstrationOptions& options) {
                                                      : "");
   clips += fmt::format(" (seed {}), retargeted by {}, {} start{} of each{}", options.seed, options.pair_mode,
                        options.starts, options.starts == 1 ? "" : "s",
-                       options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
+                       options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)"
+                       : options.answers                      ? " in answer to the partner"
+                                                              : "");
   if (options.engine.empty()) return clips + ", none followed";
   const std::string network = controller_network_of(options);
   return fmt::format("{}, {} of a kind followed in {} under {}{} by {}", clips, options.followed, options.engine,

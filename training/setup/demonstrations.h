@@ -29,6 +29,7 @@ struct DemonstrationOptions {
   std::string pair_mode = "best";          // of PAIR (docs/retargeting.md)
   int starts = 2;                          // of each clip, drawn as A.4.4 has it
   StartMode start = StartMode::kApproach;  // or kSimToReal: Algorithm 7, whose starts are all the same
+  bool answers = false;                    // it comes early and waits, and begins after its partner (kApproach)
   int followed = 200;  // clips of each kind and task whose first start is also followed in the engine
   std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
   std::string controller_network;                         // its option `network`; empty: the one it has by itself

@@ -82,9 +82,10 @@ FieldTable<PolicyTraining> demonstration_fields() {
           [](auto& t) -> auto& { return t.data.starts; }),
       field<T>(
           {.name = "start",
-           .meaning = "how the robot comes: approach (A.4.4) or sim_to_real (Algorithm 7, before it meets the real "
-                      "robot: one start)",
-           .choices = {"approach", "sim_to_real"}},
+           .meaning = "how the robot comes: approach (A.4.4), sim_to_real (Algorithm 7, before it meets the real "
+                      "robot: one start) or answer (as approach, but it is there early, waits, and begins after its "
+                      "partner)",
+           .choices = {"approach", "sim_to_real", "answer"}},
           [](auto& t) -> auto& { return t.start; }),
       field<T>(
           {.name = "followed",
