@@ -38,7 +38,7 @@ class Merger {
 
  private:
   void add(const Run& run) {
-    const Suite suite = rebased(parse_suite(run.info.suite_yaml, in(run.path, "suite.yaml")), run.path, folder_);
+    const Suite suite = rebased(parse_run_suite(run.info.suite_yaml, in(run.path, "suite.yaml")), run.path, folder_);
     const std::vector<RunInput> inputs = read_inputs(run.path);
     const bool first = kept_.suite.name.empty();
     if (first) kept_.suite = suite;

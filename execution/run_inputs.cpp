@@ -373,7 +373,7 @@ void keep_inputs(const ArchivedSuite& kept, const std::string& folder) {
 bool has_inputs(const std::string& folder) { return fs::exists(in(folder, kIndex)); }
 
 Suite suite_of_head(const Run& run) {
-  Suite suite = parse_suite(run.info.suite_yaml, in(run.path, "suite.yaml"));
+  Suite suite = parse_run_suite(run.info.suite_yaml, in(run.path, "suite.yaml"));
   require_kept_places(suite, has_inputs(run.path) ? read_inputs(run.path) : std::vector<RunInput>(), run.path);
   return suite;
 }

@@ -234,7 +234,7 @@ void require_names_of(const std::string& directory, const std::vector<std::strin
                       const std::vector<std::string>& engines) {
   const std::string path = (std::filesystem::path(directory) / "suite.yaml").string();
   if (!has_inputs(directory)) return;  // a run that was killed before its first episode, or none
-  const Suite there = parse_suite(read_text(path), path);
+  const Suite there = parse_run_suite(read_text(path), path);
   const auto require_all = [&](const char* kind, const std::vector<std::string>& known,
                                const std::vector<std::string>& wanted) {
     for (const std::string& name : wanted)
@@ -254,7 +254,7 @@ void say_replaced(const std::string& directory, const std::vector<SuitePolicy>& 
   if (replaced.empty()) return;
   const std::string path = join_without_links(directory, "suite.yaml");
   const std::string before = read_text(path);
-  const Suite there = parse_suite(before, path);
+  const Suite there = parse_run_suite(before, path);
   std::string text = before;
   for (const SuitePolicy& old : there.policies)
     for (const SuitePolicy& now : policies) {

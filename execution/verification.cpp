@@ -108,7 +108,7 @@ class Verifier {
  private:
   // Actors that no row has need not be on this machine.
   [[nodiscard]] ExperimentOptions what_is_needed() const {
-    const Suite named = parse_suite(run_.info.suite_yaml, run_.path + "/suite.yaml");
+    const Suite named = parse_run_suite(run_.info.suite_yaml, run_.path + "/suite.yaml");
     return {.skipped_controllers = without_rows(run_, named.controller_names(), &EpisodeRow::controller),
             .skipped_policies = without_rows(run_, named.policy_names(), &EpisodeRow::policy)};
   }

@@ -234,6 +234,9 @@ ControllerInfo about(const SuiteController& controller);
 // Throws InputError: file, line, key, expected, found.
 Suite load_suite(const std::string& path, const Overrides& overrides = {});
 Suite parse_suite(const std::string& yaml, const std::string& name, const Overrides& overrides = {});
+// The suite.yaml that a run keeps. It may name engines that this machine does not know, whose episodes cannot run here
+// (can_run_in).
+Suite parse_run_suite(const std::string& yaml, const std::string& name);
 
 // All keys written out, in a fixed order: what a run directory keeps. Settings of engines are those that the profile
 // says; the rest is an engine's own (resolved_settings).

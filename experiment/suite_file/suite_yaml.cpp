@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
+#include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/suite/suite.h"
@@ -48,7 +50,19 @@ void check_whole(const YamlSection& top, const Suite& suite) {
   require_sane_size(suite, static_cast<std::int64_t>(made * clips.copies() + suite.references.size()));
 }
 
-Suite read_suite(const YAML::Node& document, const std::string& file) {
+void require_known_engines(const YamlSection& top, const Suite& suite) {
+  std::vector<std::string> known = {std::string(kPlaybackEngine)};
+  for (const EngineInfo& engine : engines()) known.push_back(engine.name);
+  checked(top, "engines", [&] {
+    for (const std::string& name : suite.engines)
+      require(std::ranges::find(known, name) != known.end(), unknown_name_message("engine", name, known));
+  });
+}
+
+// A run may be of engines whose modules are elsewhere.
+enum class Origin { kUser, kRun };
+
+Suite read_suite(const YAML::Node& document, const std::string& file, Origin origin) {
   std::vector<const char*> names;
   for (const SuiteKey& key : suite_keys()) names.push_back(key.name.c_str());
   const SchemaSection top(file, document, "suite", names);
@@ -57,6 +71,7 @@ Suite read_suite(const YAML::Node& document, const std::string& file) {
   if (top.has("reference")) refuse_clips(top);
   for (const SuiteKey& key : suite_keys())
     if (suite.references.empty() || !is_led_by_clips(key)) key.read(top, suite);
+  if (origin == Origin::kUser) require_known_engines(top, suite);
   check_whole(top, suite);
   return suite;
 }
@@ -76,7 +91,8 @@ void apply_override(const YAML::Node& document, const std::string& key, const st
   node[rest] = parse_yaml(value, file);
 }
 
-Suite read_with(const std::string& yaml, const std::string& name, const Overrides& overrides) {
+Suite read_with(const std::string& yaml, const std::string& name, const Overrides& overrides,
+                Origin origin = Origin::kUser) {
   const YAML::Node document = parse_yaml(yaml, name);
   if (!document.IsMap())
     throw InputError(fmt::format("{}:1: expected a suite (a mapping), found {}", name, describe(document)));
@@ -87,7 +103,7 @@ Suite read_with(const std::string& yaml, const std::string& name, const Override
       throw InputError(fmt::format("{}:1: {}", name, error.msg));
     }
   }
-  return read_suite(document, name);
+  return read_suite(document, name, origin);
 }
 
 // The message of the suite without one of its overrides; "" where it is in order.
@@ -137,6 +153,10 @@ Suite parse_suite(const std::string& yaml, const std::string& name, const Overri
   } catch (const InputError& error) {
     throw InputError(blamed(error.what(), yaml, name, overrides));
   }
+}
+
+Suite parse_run_suite(const std::string& yaml, const std::string& name) {
+  return read_with(yaml, name, {}, Origin::kRun);
 }
 
 Suite load_suite(const std::string& path, const Overrides& overrides) {

@@ -343,6 +343,29 @@ TEST(VerifyCommand, AllIsNotAllWhereRowsCannotRunHere) {
   EXPECT_EQ(test::duet_program("verify -q " + (folder / "run"), engines).code, 0);
 }
 
+// A module of somebody's own, which another machine does not know by name: what runs here is held against the rows, and
+// the folder is read. The suite itself is refused there.
+TEST(VerifyCommand, RowsOfAnEngineThatIsUnknownHereAreLeftOut) {
+  const test::ScratchFolder folder;
+  write_file(folder / "suite.yaml", resolved_yaml(test::playback_suite()));
+  fs::create_directory(folder / "engines");
+  fs::create_symlink(DUET_FAULTY_ENGINE, fs::path(folder / "engines") / "duet_faulty.so");
+  const std::string there = "DUET_ENGINES='" + (folder / "engines") + "'",
+                    here = "DUET_ENGINES='" + (folder / "none") + "'";
+  const std::string run =
+      "run -q " + (folder / "suite.yaml") + " -s 'engines=[playback, faulty]' -o " + (folder / "run");
+  ASSERT_EQ(test::duet_program(run, there).code, 3);
+  const test::Answer all = test::duet_program("verify -q --all " + (folder / "run"), here);
+  EXPECT_EQ(all.code, 4) << all.out << all.err;
+  EXPECT_THAT(all.out, AllOf(HasSubstr("4 of 4 episodes repeat bit for bit"),
+                             HasSubstr("; 4 rows were not run: engine 'faulty' is not on this machine")));
+  EXPECT_EQ(test::duet_program("verify -q " + (folder / "run"), here).code, 0);
+  EXPECT_EQ(test::duet_program("report " + (folder / "run"), here).code, 0);
+  const test::Answer again = test::duet_program(run, here);
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("unknown engine 'faulty'"));
+}
+
 TEST(Verification, DrawsAsManyAsAskedForAndSaysOfHowMany) {
   const test::ScratchFolder folder;
   make_run(test::playback_suite(), folder / "run");

@@ -21,7 +21,7 @@ struct PublishArguments {
 // from there. The engines' settings stand behind it, for people.
 std::string suite_from_there(const std::string& run, const std::string& folder) {
   const std::string path = run + "/suite.yaml", text = read_text(path);
-  std::string moved = resolved_yaml(rebased(parse_suite(text, path), run, folder));
+  std::string moved = resolved_yaml(rebased(parse_run_suite(text, path), run, folder));
   if (const std::size_t settings = text.find("\n# "); settings != std::string::npos) moved += text.substr(settings + 1);
   return moved;
 }
