@@ -1,10 +1,13 @@
 // DART in its own world: World::step, ODE's detector on the skeleton's shapes, DART's contact and joint-limit
-// constraints, Dantzig's method with PGS behind it, joints that take forces, as gz-physics sets it up.
+// constraints, Dantzig's method with PGS behind it, joints that take forces, as gz-physics sets it up. The partner is a
+// skeleton of capsules that does not move by itself.
 #include <dart/collision/CollisionFilter.hpp>
+#include <dart/collision/CollisionGroup.hpp>
 #include <dart/collision/CollisionObject.hpp>
 #include <dart/collision/ode/OdeCollisionDetector.hpp>
 #include <dart/config.hpp>
 #include <dart/constraint/BoxedLcpConstraintSolver.hpp>
+#include <dart/constraint/ContactConstraint.hpp>
 #include <dart/constraint/DantzigBoxedLcpSolver.hpp>
 #include <dart/constraint/PgsBoxedLcpSolver.hpp>
 #include <dart/dynamics/BodyNode.hpp>
@@ -52,6 +55,44 @@ struct LinkFilter final : dart::collision::CollisionFilter {
   }
 };
 
+// A contact with the partner's skin. DART's constraint has one softness for all contacts of the process and corrects
+// overlap by 1 mm/s at most (ContactConstraint.cpp: DART_CFM, DART_MAX_ERV); its normal row gets the pair's spring and
+// damper, taken implicitly: erp = hK / (hK + D), cfm = 1 / (hK + D). Friction is the pair's, in DART's pyramid.
+class SkinContact final : public dart::constraint::ContactConstraint {
+ public:
+  // `contact` has the depth 0, else DART corrects it too, and outlives this. `depth` [m], `step` [s].
+  SkinContact(dart::collision::Contact& contact, double step, const duet::ContactCompliance& skin, double depth,
+              double friction)
+      : ContactConstraint(contact, step),
+        push_out_(skin.stiffness * depth / (step * skin.stiffness + skin.damping)),
+        softness_(1.0 / (step * (step * skin.stiffness + skin.damping))),
+        friction_(friction) {}
+
+ protected:
+  void getInformation(dart::constraint::ConstraintInfo* info) override {
+    ContactConstraint::getInformation(info);
+    info->b[0] += push_out_;
+    for (std::size_t row = 1; row < getDimension(); ++row) {
+      info->lo[row] = -friction_;
+      info->hi[row] = friction_;
+    }
+  }
+  void applyUnitImpulse(std::size_t row) override {
+    ContactConstraint::applyUnitImpulse(row);
+    unit_row_ = row;
+  }
+  void getVelocityChange(double* change, bool with_cfm) override {
+    ContactConstraint::getVelocityChange(change, with_cfm);
+    if (with_cfm && unit_row_ == 0) change[0] += softness_;
+  }
+
+ private:
+  double push_out_;  // speed at which the skin would separate the pair [m/s]
+  double softness_;  // change of that speed by an impulse [1/kg]
+  double friction_;
+  std::size_t unit_row_ = 0;
+};
+
 class DartOwn final : public own::OwnWorld {
  public:
   explicit DartOwn(const duet::Scene& scene) : OwnWorld(scene), n_(robot().dof()) {
@@ -75,6 +116,7 @@ class DartOwn final : public own::OwnWorld {
     filter->robot = skeleton_.get();
     filter->may_touch = [this](int i, int j) { return may_touch(i, j); };
     world_->getConstraintSolver()->getCollisionOption().collisionFilter = filter;
+    if (scene.partner == duet::PartnerMode::kSolid) make_partner();
     place();
   }
 
@@ -82,10 +124,22 @@ class DartOwn final : public own::OwnWorld {
   [[nodiscard]] std::string version() const override { return DART_VERSION; }
 
  private:
-  void add_shape(dd::BodyNode* body, const dd::ShapePtr& shape, const duet::Pose& X_LS, double friction) {
+  struct Capsule {
+    dd::FreeJoint* joint;
+    std::shared_ptr<dd::CapsuleShape> shape;
+    dd::ShapeNode* node;
+  };
+  struct Touched {
+    int link, capsule;
+    double depth;
+    dart::collision::Contact contact;
+  };
+
+  dd::ShapeNode* add_shape(dd::BodyNode* body, const dd::ShapePtr& shape, const duet::Pose& X_LS, double friction) {
     auto* node = body->createShapeNodeWith<dd::CollisionAspect, dd::DynamicsAspect>(shape);
     node->setRelativeTransform(isometry(X_LS));
     node->getDynamicsAspect()->setFrictionCoeff(friction);
+    return node;
   }
 
   // DART takes the lower of two frictions: that of the ground is the pair's where links have more. Links have that of
@@ -137,6 +191,80 @@ class DartOwn final : public own::OwnWorld {
     return body;
   }
 
+  // The partner is not in the world, where DART would make rigid contacts with it.
+  void make_partner() {
+    humans_ = dd::Skeleton::create("partner");
+    const auto detector = world_->getConstraintSolver()->getCollisionDetector();
+    robot_group_ = detector->createCollisionGroup(skeleton_.get());
+    partner_group_ = detector->createCollisionGroup();
+    for (const duet::HumanCapsule& human : scene().human.capsules) {
+      const std::string number = std::to_string(capsules_.size());
+      dd::FreeJoint::Properties joint_named;
+      joint_named.mName = std::string("h").append(number);
+      const dd::BodyNode::Properties named{dd::BodyNode::AspectProperties(std::string("c").append(number))};
+      const auto [joint, body] = humans_->createJointAndBodyNodePair<dd::FreeJoint>(nullptr, joint_named, named);
+      const auto shape = std::make_shared<dd::CapsuleShape>(human.radius, 0.1);
+      capsules_.push_back({joint, shape, add_shape(body, shape, {}, 1.0)});
+      partner_group_->addShapeFrame(capsules_.back().node);
+    }
+    humans_->setMobile(false);
+    touched_.reserve(narrow_phase_.capacity());
+  }
+
+  // A capsule moves as a rigid body with the velocities of its ends. The detector does not follow a shape's height: a
+  // capsule that became longer by 10 um or more enters its group anew.
+  void place_partner() {
+    for (std::size_t i = 0; i < capsules_.size(); ++i) {
+      const duet::HumanCapsule& human = scene().human.capsules[i];
+      const duet::CapsulePose pose = duet::capsule_pose(human, partner_.joints);
+      const auto ends = human.ends(partner_.joints), speeds = human.ends(partner_.velocities);
+      const Eigen::Vector3d axis = ends[1] - ends[0];
+      capsules_[i].joint->setTransform(isometry(pose.X_WC));
+      capsules_[i].joint->setLinearVelocity(duet::capsule_velocity(human, partner_, pose.X_WC.p));
+      capsules_[i].joint->setAngularVelocity(axis.cross(speeds[1] - speeds[0]) / std::max(1e-12, axis.squaredNorm()));
+      const double height = std::max(1e-5, 1e-5 * std::round(2e5 * pose.half_length));
+      if (capsules_[i].shape->getHeight() == height) continue;
+      partner_group_->removeShapeFrame(capsules_[i].node);
+      capsules_[i].shape->setHeight(height);
+      partner_group_->addShapeFrame(capsules_[i].node);
+    }
+  }
+
+  // Points between robot and partner become constraints of the step, in an order that no space decides.
+  void touch_partner() {
+    world_->getConstraintSolver()->removeAllConstraints();
+    touched_.clear();
+    if (capsules_.empty() || !partner_.present) return;
+    place_partner();
+    dart::collision::CollisionResult found;
+    robot_group_->collide(partner_group_.get(), {true, narrow_phase_.capacity()}, &found);
+    for (const dart::collision::Contact& contact : found.getContacts()) {
+      const int i = link_of(contact.collisionObject1, skeleton_.get());
+      const dart::collision::CollisionObject* human = i >= 0 ? contact.collisionObject2 : contact.collisionObject1;
+      touched_.push_back({i >= 0 ? i : link_of(contact.collisionObject2, skeleton_.get()),
+                          link_of(human, humans_.get()), contact.penetrationDepth, contact});
+    }
+    std::stable_sort(touched_.begin(), touched_.end(), [](const Touched& a, const Touched& b) {
+      return std::tie(a.link, a.capsule, a.contact.point.x(), a.contact.point.y()) <
+             std::tie(b.link, b.capsule, b.contact.point.x(), b.contact.point.y());
+    });
+    for (Touched& touched : touched_) add_skin(touched);
+  }
+
+  // The points of a pair of shapes share its spring and damper.
+  void add_skin(Touched& touched) {
+    const auto of_pair = static_cast<double>(std::count_if(touched_.begin(), touched_.end(), [&](const Touched& other) {
+      return other.contact.collisionObject1 == touched.contact.collisionObject1 &&
+             other.contact.collisionObject2 == touched.contact.collisionObject2;
+    }));
+    duet::ContactCompliance skin = scene().human.capsules[touched.capsule].skin;
+    skin.stiffness /= of_pair;
+    skin.damping /= of_pair;
+    touched.contact.penetrationDepth = 0.0;
+    world_->getConstraintSolver()->addConstraint(
+        std::make_shared<SkinContact>(touched.contact, scene().dt, skin, touched.depth, scene().friction.robot_human));
+  }
+
   void place() override {
     forget_contacts();
     skeleton_->clearConstraintImpulses();
@@ -166,6 +294,7 @@ class DartOwn final : public own::OwnWorld {
     for (int link = 0; link <= n_ && pushes_.any(); ++link)
       if (const duet::ExternalForces::Push& push = pushes_.all()[link]; !push.f_W.isZero(0.0))
         bodies_[link]->addExtForce(push.f_W, push.p_L);
+    touch_partner();
     world_->step();
     read();
     if (!duet::speeds_are_sane(state_)) return duet::Outcome::kDiverged;
@@ -198,6 +327,11 @@ class DartOwn final : public own::OwnWorld {
       else
         report(j, -1, -1, p_W, -c.force, c.penetrationDepth);
     }
+    for (const Touched& touched : touched_) {
+      const bool first = link_of(touched.contact.collisionObject1, skeleton_.get()) >= 0;
+      const Eigen::Vector3d f_W = first ? touched.contact.force : Eigen::Vector3d(-touched.contact.force);
+      report(touched.link, -1, touched.capsule, touched.contact.point, f_W, touched.depth);
+    }
     end_contacts();
   }
 
@@ -221,17 +355,19 @@ class DartOwn final : public own::OwnWorld {
   dd::FreeJoint* base_ = nullptr;
   std::vector<dd::RevoluteJoint*> hinges_;
   std::vector<dd::BodyNode*> bodies_;
+  dd::SkeletonPtr humans_;
+  std::vector<Capsule> capsules_;
+  dart::collision::CollisionGroupPtr robot_group_, partner_group_;
+  std::vector<Touched> touched_;
 };
 
 std::string version() { return DART_VERSION; }
 std::unique_ptr<duet::Backend> make(const duet::Scene& scene) { return std::make_unique<DartOwn>(scene); }
-const duet::EngineModule kModule = {
-    .name = "dart_own",
-    .version = version,
-    .make = make,
-    .options = kOptions,
-    .bare_step_seconds = own::bare_step_seconds<DartOwn>,
-    .no_solid_partner = "DART's contact constraint is rigid: it has no stiffness and damping of a pair"};
+const duet::EngineModule kModule = {.name = "dart_own",
+                                    .version = version,
+                                    .make = make,
+                                    .options = kOptions,
+                                    .bare_step_seconds = own::bare_step_seconds<DartOwn>};
 
 }  // namespace
 
