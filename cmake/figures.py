@@ -69,6 +69,27 @@ def wilson(k, n):
     return [f"{100 * x / (1 + z * z / n):.1f}" for x in (max(middle - spread, 0.0), min(middle + spread, 1 + z * z / n))]
 
 
+def paired(first, second):
+    """Mean of `second` less that of `first` over the same episodes in points, with the interval that the program gives it
+    (newcombe_paired of statistics/statistics.h)."""
+    z, n = 1.959963984540054, len(first)
+    both, ahead, behind = (sum((x, y) == pair for x, y in zip(first, second)) for pair in ((True, True), (False, True), (True, False)))
+    neither = n - both - ahead - behind
+    sides = []
+    for k in (both + ahead, both + behind):
+        middle, spread = k / n + z * z / (2 * n), z * (k / n * (1 - k / n) / n + z * z / (4 * n * n)) ** 0.5
+        low, high = (max(0.0, middle - spread) / (1 + z * z / n), min(1 + z * z / n, middle + spread) / (1 + z * z / n))
+        sides.append((k / n - (0.0 if k == 0 else low), (1.0 if k == n else high) - k / n))
+    product = (both + ahead) * (behind + neither) * (both + behind) * (ahead + neither)
+    determinant = both * neither - ahead * behind
+    if determinant > 0:
+        determinant = max(determinant - n / 2, 0)
+    turn = determinant / product**0.5 if product else 0.0
+    reach = [max(x * x - 2 * turn * x * y + y * y, 0) ** 0.5 for x, y in ((sides[0][0], sides[1][1]), (sides[0][1], sides[1][0]))]
+    difference = (ahead - behind) / n
+    return f"{100 * difference:+.1f} [{100 * (difference - reach[0]):+.1f}, {100 * (difference + reach[1]):+.1f}]"
+
+
 def figure(rows, file, **keys):
     """The only line with these values; a key that is not named has any."""
     found = [r for r in rows if all(r[key] == value for key, value in keys.items())]
@@ -206,6 +227,52 @@ def actuation(folder):
     return markdown(["Engine", "Controller", *columns.values()], [False] * 2 + [True] * len(columns), table)
 
 
+def partner_of(folder):
+    return re.search(r"(?m)^partner: (\w+)", (ROOT / folder / "suite.yaml").read_text())[1]
+
+
+def blocks(folder, policy):
+    """Rows of the policy by arm and engine, each in the order of clips."""
+    found = {}
+    for row in sorted(rows_in(folder), key=lambda row: (row["clip"], row["episode"])):
+        if row["policy"] == policy:
+            found.setdefault(row["perturbation"], {}).setdefault(row["engine"], []).append(row)
+    return {arm: found[arm] for arm in arms_of(folder)}
+
+
+def own_worlds(policy, *folders):
+    """Success in % and falls by partner, arm and engine, each world of an engine's own beside its parity engine."""
+    table, ran = [], {row["engine"] for folder in folders for row in rows_in(folder)}
+    engines_in_order = [name for engine in ENGINES for name in (engine, f"{engine}_own") if name in ran]
+    for folder in folders:
+        for arm, engines_of in blocks(folder, policy).items():
+            line = [partner_of(folder), f"`{arm}`"]
+            for engine in engines_in_order:
+                some = engines_of.get(engine, [])
+                won = sum(bool(r["success"]) for r in some)
+                line.append(f"{short(won / len(some))} [{', '.join(wilson(won, len(some)))}]; {sum(r['fell'] for r in some)} of {len(some)}" if some else "-")
+            table.append(line)
+    return markdown(["Partner", "Arm", *[WORLDS[engine] for engine in engines_in_order]], [False] * 2 + [True] * len(engines_in_order), table)
+
+
+def own_worlds_paired(policy, *folders):
+    """The paired differences in points, of success and of falls: own worlds less their parity engines, and for scale parity engines less another."""
+    ran = {row["engine"] for folder in folders for row in rows_in(folder)}
+    pairs = [(engine, f"{engine}_own") for engine in ENGINES if f"{engine}_own" in ran] + [("mujoco", engine) for engine in ("bullet", "dart", "ode") if engine in ran]
+    table = []
+    for folder in folders:
+        for arm, engines_of in blocks(folder, policy).items():
+            for key, what in (("success", "success"), ("fell", "falls")):
+                line = [partner_of(folder), f"`{arm}`", what]
+                for first, second in pairs:
+                    a, b = ({(r["clip"], r["episode"]): bool(r[key]) for r in engines_of.get(name, [])} for name in (first, second))
+                    same = [episode for episode in a if episode in b]
+                    line.append(f"{paired([a[e] for e in same], [b[e] for e in same])}; {len(same)}" if same else "-")
+                table.append(line)
+    heads = [f"{WORLDS[second]}, less {WORLDS[first]}" for first, second in pairs]
+    return markdown(["Partner", "Arm", "", *heads], [False] * 3 + [True] * len(pairs), table)
+
+
 def actuation_walkers(folder, program):
     """In how many engines each walker fell, by arm, beside the largest step of the explicit law that the program foretells."""
     steps = {one["controller"]: one for one in json.loads(output([program, "list", "controllers", "--stability", "--json"]))}
@@ -246,11 +313,13 @@ def contents(source, program):
         return lines if any(line.startswith("|") for line in lines) else ["```", *lines, "```"]
     if words[:1] == ["actuation_walkers"] and len(words) == 2:
         return actuation_walkers(words[1], program)
+    if words[:1] in (["own_worlds"], ["own_worlds_paired"]) and len(words) > 2:
+        return (own_worlds if words[0] == "own_worlds" else own_worlds_paired)(*words[1:])
     tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
               "actuation": actuation}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, pictures FILE, actuation RUN, actuation_walkers RUN, suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, pictures FILE, actuation RUN, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):
