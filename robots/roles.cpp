@@ -99,9 +99,6 @@ bool base_is_pelvis(const RobotModel& robot) {
   return pelvis == nullptr || (pelvis->link == 0 && pelvis->X_LF.p.isZero(0.0) && pelvis->X_LF.R.vec().isZero(0.0));
 }
 
-namespace {
-
-// Joints that are no leg's.
 std::vector<int> upper_joints(const RobotModel& robot) {
   const std::vector<int> legs = leg_joints(robot);
   std::vector<int> upper;
@@ -109,8 +106,6 @@ std::vector<int> upper_joints(const RobotModel& robot) {
     if (!std::binary_search(legs.begin(), legs.end(), j)) upper.push_back(j);
   return upper;
 }
-
-}  // namespace
 
 void walk_straight(RobotMotion& motion, const Phases& phases, const Pose& start) {
   if (phases.act_begin == 0) return;

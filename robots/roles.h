@@ -30,6 +30,8 @@ std::vector<int> tilting_waist(const RobotModel& robot);
 
 // Joints of both legs, ascending.
 std::vector<int> leg_joints(const RobotModel& robot);
+// Every other joint.
+std::vector<int> upper_joints(const RobotModel& robot);
 
 // The soles' shapes by the link that carries them, in the card's order: the left foot's first.
 std::vector<std::vector<int>> soles_of_feet(const RobotModel& robot);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -92,22 +93,27 @@ class DstarPolicy final : public Policy {
   bool drawn_ = false;
 };
 
-// Networks that ship, by the network of WBC-Sim that they learnt over.
-constexpr std::string_view kBraced = "braced", kStudent = "student";
+// A network that ships, and what its file's name has behind the policy's.
+struct ShippedNetwork {
+  std::string_view name, suffix;
+};
+constexpr std::array kShipped = {ShippedNetwork{"braced", "_braced"}, ShippedNetwork{"answer", "_answer"},
+                                 ShippedNetwork{"student", ""}};
 
 // The options of a suite; an empty language is the one that is built in.
 struct DstarOptions {
-  std::string network{kBraced}, language;
+  std::string network{kShipped.front().name}, language;
   DstarSampling sampling;
 };
 
 const FieldTable<DstarOptions>& dstar_options() {
   using O = DstarOptions;
   static const FieldTable<O> table = {
-      duet::field<O>({.name = "network",
-                      .meaning = "braced or student (learnt over WBC-Sim's network of that name), or the path of a "
-                                 "network"},
-                     &O::network),
+      duet::field<O>(
+          {.name = "network",
+           .meaning = "braced, answer (learnt from a robot that answers its partner) or student (the oldest), or "
+                      "the path of a network"},
+          &O::network),
       duet::field<O>({.name = "language", .meaning = "path of an NPZ table of prompts and their embeddings"},
                      &O::language),
       duet::field<O>(
@@ -128,11 +134,11 @@ DstarOptions read_dstar_options(const std::string& name, const PolicyOptions& op
 }
 
 std::string network_path(const std::string& name, const DstarOptions& options) {
-  const bool braced = options.network == kBraced;
-  if (!braced && options.network != kStudent)
+  const auto* const shipped = std::ranges::find(kShipped, options.network, &ShippedNetwork::name);
+  if (shipped == kShipped.end())
     return first_existing(fmt::format("network of policy '{}' (option 'network')", name), {options.network});
   return share_file(fmt::format("network of policy '{}' (option 'network' names another)", name),
-                    fmt::format("policies/dstar/{}{}.safetensors", name, braced ? "_braced" : ""));
+                    fmt::format("policies/dstar/{}{}.safetensors", name, shipped->suffix));
 }
 
 // "" for the encoder that is built in.

@@ -138,6 +138,30 @@ TEST(MakeDemonstrations, InAnswerTheRobotBeginsAfterItsPartner) {
   EXPECT_GE(both, 18);  // of 36; hands are half up in the first frame of some recordings
 }
 
+// All joints ramp from 0 to 1 within the act.
+AdaptedMotion ramp() {
+  constexpr int kFrames = 300, kBegin = 100, kEnd = 200;
+  AdaptedMotion meant{{kTickRate, test::g1()->joint_names(), {}, Eigen::MatrixXd::Zero(test::g1()->dof(), kFrames)},
+                      {kBegin, kEnd}};
+  for (int t = 0; t < kFrames; ++t) {
+    meant.motion.root.push_back({Eigen::Quaterniond::Identity(), Eigen::Vector3d(t, 0.0, 0.8)});
+    meant.motion.q.col(t).setConstant(std::clamp((t - kBegin) / 100.0, 0.0, 1.0));
+  }
+  return meant;
+}
+
+TEST(LateAct, IsPutOffByWhatTheRobotWasLate) {
+  const AdaptedMotion meant = ramp(), late = put_off(meant, 20);
+  EXPECT_EQ(act_lag(meant, states_of(meant.motion), *test::g1()), 0);
+  EXPECT_EQ(act_lag(meant, states_of(late.motion), *test::g1()), 20);
+  EXPECT_EQ(late.phases.act_begin, 120);
+  EXPECT_EQ(late.phases.act_end, 220);
+  EXPECT_EQ(late.motion.root[90].p.x(), 90.0);    // comes as before,
+  EXPECT_EQ(late.motion.root[119].p.x(), 100.0);  // waits
+  EXPECT_EQ(late.motion.root[299].p.x(), 279.0);  // and does the rest
+  EXPECT_EQ(put_off(meant, 0).motion.q, meant.motion.q);
+}
+
 TEST(MakeDemonstrations, BeforeAStillPartnerNobodyBeginsUntilHeHasLookedForFiveSeconds) {
   DemonstrationOptions options = small_options();
   options.engine = "";

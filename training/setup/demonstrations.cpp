@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <optional>
 
 #include "duet/backends/engine_module.h"
@@ -16,6 +18,7 @@
 #include "duet/motion/paired_motion.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/phase_adaptation.h"
+#include "duet/robots/roles.h"
 #include "duet/rollout/act_episode.h"
 #include "duet/rows/episode_row.h"
 
@@ -24,6 +27,8 @@ namespace {
 
 constexpr std::size_t kBeforeFall = 50;  // frames
 constexpr int kShortest = 100;
+// Executed, an act is later than its reference by the usual lag; none is put off by more than half a second.
+constexpr int kUsualLag = 8, kMostDelay = 25;                 // frames
 constexpr double kQuickReaction = 0.15, kSlowReaction = 0.3;  // [s]
 constexpr double kSlowWalk = 0.25, kQuickWalk = 0.5;          // [m/s]
 
@@ -43,7 +48,7 @@ int ahead(const PairedMotion& clip, const RobotMotion& motion, const RobotModel&
   const std::optional<int> partner = act_onset(onset, human_agent(clip.partner.joints));
   const std::optional<int> own = act_onset(onset, robot_agent(robot, motion));
   if (!partner || !own) return 0;
-  return std::max(0, *partner + static_cast<int>(std::lround(reaction * kTickRate)) - *own);
+  return std::max(0, *partner + ticks_of(reaction) - *own);
 }
 
 // Frames of a track from `begin` on; the last one stays where there are no more.
@@ -64,6 +69,16 @@ Take take_of(const PairedMotion& clip, const RobotModel& robot, const Demonstrat
   if (options.answers) take.adapted.clip_frame += ahead(clip, take.adapted.motion, robot, random);
   take.partner = frames_from(clip.partner.joints, take.adapted.clip_frame, take.adapted.motion.frames());
   return take;
+}
+
+// Whether the meant motion passes the rule beside a partner whom it passes through.
+bool passes(const Take& take, const RobotModel& robot) {
+  const Phases& act = take.adapted.phases;
+  const int later = ticks_of(1.0);
+  return judge_interaction(take.clip->task, {.performer = robot_agent(robot, take.adapted.motion),
+                                             .partner = human_agent(take.partner),
+                                             .window = {act.act_begin - later / 2, act.act_end + later}})
+      .success;
 }
 
 ControllerOptions controller_options(const DemonstrationOptions& options) {
@@ -136,14 +151,19 @@ bool demonstrate(Task task, const DemonstrationClips& kind, const PairOptions& p
     if (by.stop()) return;
     const PairedMotion& clip = clips[i / starts];
     made[i] = take_of(clip, *by.robot, options, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
-    const bool followed = !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
+    if (options.answers && !passes(*made[i], *by.robot)) made[i].reset();
+    const bool followed = made[i] && !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
     if (followed) follow(*made[i], by.robot, options, by.make_policy, by.make_controller);
+    if (followed && options.answers && !itself)
+      made[i]->adapted =
+          put_off(made[i]->adapted,
+                  std::clamp(act_lag(made[i]->adapted, made[i]->followed, *by.robot) - kUsualLag, 0, kMostDelay));
     by.progress.advance();
   });
   by.progress.finish();
   if (by.stop()) return false;
   for (std::optional<Take>& take : made) {
-    add(*take, itself, set);
+    if (take) add(*take, itself, set);
     take.reset();
   }
   return true;
@@ -158,6 +178,37 @@ std::string controller_network_of(const DemonstrationOptions& options) {
 }
 
 }  // namespace
+
+int act_lag(const AdaptedMotion& meant, const std::vector<RobotState>& did, const RobotModel& robot) {
+  constexpr int kAround = 50, kLatest = 50;  // frames
+  const int frames = std::min(static_cast<int>(did.size()), meant.motion.frames());
+  const int begin = std::max(0, meant.phases.act_begin - kAround);
+  const int end = std::min(frames, meant.phases.act_end + kAround + kLatest);
+  const std::vector<int> upper = upper_joints(robot);
+  double least = std::numeric_limits<double>::infinity();
+  int best = 0;
+  for (int lag = 0; lag <= kLatest; ++lag) {
+    double apart = 0.0;
+    for (int t = begin; t < end; ++t)
+      for (const int j : upper) apart += std::abs(did[t].q[j] - meant.motion.q(j, std::max(0, t - lag)));
+    if (apart >= least) continue;
+    least = apart;
+    best = lag;
+  }
+  return best;
+}
+
+AdaptedMotion put_off(const AdaptedMotion& meant, int frames) {
+  AdaptedMotion late = meant;
+  const int act = meant.phases.act_begin, last = meant.motion.frames();
+  for (int t = act; t < last; ++t) {
+    const int source = std::max(act, t - frames);
+    late.motion.root[t] = meant.motion.root[source];
+    late.motion.q.col(t) = meant.motion.q.col(source);
+  }
+  late.phases = {std::min(act + frames, last - 1), std::min(meant.phases.act_end + frames, last)};
+  return late;
+}
 
 std::string origin_of(const DemonstrationOptions& options) {
   std::string clips;
