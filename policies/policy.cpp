@@ -131,6 +131,16 @@ class OnOtherBody final : public Policy {
     return plan;
   }
 
+  [[nodiscard]] bool corrects() const override { return policy_->corrects(); }
+
+  void correct(const Observation& observation, Reference& reference) override {
+    Reference moved{reference.X_WB, to_policy_.positions(reference.q)};
+    const Eigen::VectorXd before = moved.q;
+    policy_->correct(seen(observation), moved);
+    reference.X_WB = moved.X_WB;
+    reference.q += to_body_.rates(moved.q - before);
+  }
+
   [[nodiscard]] PolicyFaults faults() const override { return policy_->faults(); }
 
  private:

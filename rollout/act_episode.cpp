@@ -93,7 +93,11 @@ const Reference* PolicyReference::at(const TickView& present) {
   if (present.tick % kTicksPerPlan == 0) plan(present.tick);
   if (policy_.faults().dead) return nullptr;
   deliver(present.tick);
-  return &scheduler_.at(present.tick);
+  const Reference& fused = scheduler_.at(present.tick);
+  if (!policy_.corrects()) return &fused;
+  corrected_ = fused;
+  policy_.correct(history_.at(present.tick), corrected_);
+  return &corrected_;
 }
 
 void PolicyReference::look(const TickView& present) {

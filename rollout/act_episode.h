@@ -88,6 +88,7 @@ class PolicyReference final : public ReferenceSource {
   Perception perception_;
   ObservationHistory history_;
   Scheduler scheduler_;
+  Reference corrected_;  // by a policy that corrects
   std::deque<SentPlan> on_their_way_;
   std::vector<double> milliseconds_;
 };

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "duet/core/field.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/policies/controls/control_policy.h"
 #include "duet/policies/dstar/dstar_policy.h"
 #include "duet/policies/dstar/retrieval.h"
 #include "duet/policies/external/external_policy.h"
+#include "duet/policies/hand_servo.h"
 #include "duet/policies/reference_policies.h"
 
 namespace duet {
@@ -117,7 +119,44 @@ const Entry& find_entry(const std::string& name) {
   throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));
 }
 
+struct ServoOption {
+  bool on = false;
+};
+
+const FieldTable<ServoOption>& servo_options() {
+  static const FieldTable<ServoOption> table = {field<ServoOption>(
+      {.name = kHandServo,
+       .meaning = "in tasks of hand at hand, the arm's last decimetres go to the partner's seen hand; "
+                  "the arm's name has to say `servo`"},
+      &ServoOption::on)};
+  return table;
+}
+
+bool takes_servo(const Entry& entry) {
+  return entry.role.role != ArmRole::kControl && &entry != &kFunction && &entry != &kRegistered;
+}
+
+PolicyInfo info_of(const Entry& entry, const std::string& name) {
+  PolicyInfo info = entry.info(name);
+  if (takes_servo(entry))
+    for (PolicyOption& option : common_policy_options()) info.options.push_back(std::move(option));
+  return info;
+}
+
+// Takes the servo's option out of those of a policy, which knows nothing of it.
+ServoOption take_servo(const std::string& name, PolicyOptions& options) {
+  PolicyOptions taken;
+  if (auto node = options.extract(kHandServo)) taken.insert(std::move(node));
+  return read_options("policy", name, servo_options(), taken);
+}
+
+PolicyMaker servoed(PolicyMaker maker, const Robot& robot) {
+  return [maker = std::move(maker), robot] { return with_hand_servo(maker(), robot); };
+}
+
 }  // namespace
+
+std::vector<PolicyOption> common_policy_options() { return option_list<PolicyOption>(servo_options()); }
 
 std::vector<PolicyInfo> policies() {
   std::vector<PolicyInfo> infos;
@@ -139,7 +178,7 @@ void register_policy(const PolicyInfo& info, PolicyLoader load) {
   registered().add("policy", {info.name, info, std::move(load)}, taken);
 }
 
-PolicyInfo policy_info(const std::string& name) { return find_entry(name).info(name); }
+PolicyInfo policy_info(const std::string& name) { return info_of(find_entry(name), name); }
 
 PolicyRole policy_role(const std::string& name) {
   for (const Entry& entry : kPolicies)
@@ -148,16 +187,22 @@ PolicyRole policy_role(const std::string& name) {
 }
 
 LoadedFiles policy_files(const std::string& name, const PolicyOptions& options) {
-  return find_entry(name).files(name, options);
+  const Entry& entry = find_entry(name);
+  PolicyOptions own = options;
+  if (takes_servo(entry)) take_servo(name, own);
+  return entry.files(name, own);
 }
 
 PolicyMaker policy_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
   const Entry& entry = find_entry(name);
-  const PolicyInfo info = entry.info(name);
+  const PolicyInfo info = info_of(entry, name);
   std::vector<std::string> known;
   for (const PolicyOption& option : info.options) known.push_back(option.name);
   check_options("policy", name, options, known);
-  return entry.maker(name, std::move(robot), options);
+  PolicyOptions own = options;
+  const bool servo = takes_servo(entry) && take_servo(name, own).on;
+  PolicyMaker maker = entry.maker(name, robot, own);
+  return servo ? servoed(std::move(maker), robot) : maker;
 }
 
 std::unique_ptr<Policy> make_policy(const std::string& name, Robot robot, const PolicyOptions& options) {

@@ -18,7 +18,9 @@ namespace duet {
 // stands), "dstar", "dp", ... A name that ends in ".yaml" is a policy descriptor's path and as good as one of them.
 std::vector<PolicyInfo> policies();
 std::vector<std::string> policy_names();
-PolicyInfo policy_info(const std::string& name);
+// Options that shipped policies and descriptors take beside its own, but no control: hand_servo.
+std::vector<PolicyOption> common_policy_options();
+PolicyInfo policy_info(const std::string& name);  // with the common options that it takes
 // The role of a policy in tables, whatever a suite calls it; a descriptor, and what a program adds, competes.
 PolicyRole policy_role(const std::string& name);
 // Every file that such a policy loads, in a fixed order. Throws as policy_maker for a name that is unknown and a

@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -100,30 +99,17 @@ PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotMode
 }
 
 ControlPolicy::ControlPolicy(std::shared_ptr<const RobotModel> robot, const ControlScript& script)
-    : robot_(std::move(robot)),
-      name_(script.name),
-      script_(script),
-      now_(script),
-      kinematics_(*robot_),
-      J_(3, 6 + robot_->dof()) {
-  require(!robot_->roles.arms[0].empty() && !robot_->roles.arms[1].empty(),
-          "policy '{}': robot '{}' has no arms in its card (roles.arms)", name_, robot_->name);
-  kinematics_.update({}, robot_->neutral);
-  for (const int side : {0, 1}) {
-    shoulder_B_[side] = kinematics_.frame_position(robot_->track_frame(side == 0 ? "lshoulder" : "rshoulder"));
-    arm_[side] = arm_length(*robot_, side);
-  }
-  const Eigen::Vector3d head = kinematics_.frame_position(robot_->track_frame("head"));
-  const double arm = arm_[1];
-  const Eigen::Vector3d& right = shoulder_B_[1];
+    : robot_(std::move(robot)), name_(script.name), script_(script), now_(script), arms_(robot_, name_) {
+  const double arm = arms_.length(1);
+  const Eigen::Vector3d head = arms_.head(), right = arms_.shoulder(1);
   for (const int side : {0, 1})
     poses_.forward[side] =
-        reached(side, shoulder_B_[side] + arm * Eigen::Vector3d(0.85, side == 0 ? -0.05 : 0.05, -0.12));
-  poses_.raised = reached(1, right + arm * Eigen::Vector3d(0.55, -0.15, 0.55));
-  poses_.wave_out = reached(1, right + arm * Eigen::Vector3d(0.40, -0.50, 0.50));
-  poses_.wave_in = reached(1, right + arm * Eigen::Vector3d(0.45, 0.10, 0.50));
-  poses_.mouth = reached(1, head + arm * Eigen::Vector3d(0.30, -0.10, -0.05));
-  poses_.blown = reached(1, right + arm * Eigen::Vector3d(0.85, 0.05, 0.15));
+        arms_.reached(side, arms_.shoulder(side) + arm * Eigen::Vector3d(0.85, side == 0 ? -0.05 : 0.05, -0.12));
+  poses_.raised = arms_.reached(1, right + arm * Eigen::Vector3d(0.55, -0.15, 0.55));
+  poses_.wave_out = arms_.reached(1, right + arm * Eigen::Vector3d(0.40, -0.50, 0.50));
+  poses_.wave_in = arms_.reached(1, right + arm * Eigen::Vector3d(0.45, 0.10, 0.50));
+  poses_.mouth = arms_.reached(1, head + arm * Eigen::Vector3d(0.30, -0.10, -0.05));
+  poses_.blown = arms_.reached(1, right + arm * Eigen::Vector3d(0.85, 0.05, 0.15));
   reset({});
 }
 
@@ -131,7 +117,7 @@ void ControlPolicy::reset(const EpisodeContext& context) {
   start_ = robot_->standing_state(context.start.X_WB);
   now_ = script_.told ? told_script(context.task) : script_;
   followed_ = robot_->neutral;
-  lowest_hand_.fill(std::numeric_limits<double>::infinity());
+  partner_.reset();
   awake_ = !now_.waits;
   leaning_ = 0.0;
 }
@@ -172,7 +158,8 @@ void ControlPolicy::follow(const ObservationFrame& frame) {
   };
   const int hand = cost(kLeftHand) <= cost(kRightHand) ? kLeftHand : kRightHand;
   const int side = now_.follows;
-  stretch(side, X_WY.inverse() * Eigen::Vector3d(frame.partner.col(hand)) - shoulder_B_[side], true, followed_);
+  arms_.stretch(side, X_WY.inverse() * Eigen::Vector3d(frame.partner.col(hand)) - arms_.shoulder(side), true,
+                followed_);
 }
 
 // Arms from the shoulders and the trunk from the root, each in the frame of who faces the other; the robot's own size.
@@ -186,18 +173,15 @@ void ControlPolicy::mirror(const ObservationFrame& frame, const Place& place) {
   for (const int side : {0, 1}) {
     const auto& arm = kArms[side];
     const double length = part(arm[0], arm[1]).norm() + part(arm[1], arm[2]).norm() + part(arm[2], arm[3]).norm();
-    stretch(side, part(arm[0], arm[3]) * (arm_[side] / std::max(length, 1e-6)), false, followed_);
+    arms_.stretch(side, part(arm[0], arm[3]) * (arms_.length(side) / std::max(length, 1e-6)), false, followed_);
   }
   const Eigen::Vector3d trunk = part(0, kHead);
   leaning_ = std::clamp(std::atan2(trunk.x(), trunk.z()) / (kWaist + kPitch), 0.0, 1.0);
 }
 
 void ControlPolicy::watch(const ObservationFrame& frame) {
-  for (const auto& [side, hand] : {std::pair{0, kLeftHand}, {1, kRightHand}}) {
-    const double height = frame.partner(2, hand) - frame.partner(2, 0);
-    lowest_hand_[side] = std::min(lowest_hand_[side], height);
-    awake_ = awake_ || height >= lowest_hand_[side] + kRaisedHand;
-  }
+  partner_.look(frame);
+  for (const int side : {0, 1}) awake_ = awake_ || partner_.height[side] >= partner_.lowest[side] + kRaisedHand;
 }
 
 double ControlPolicy::bow(double seconds) const {
@@ -257,39 +241,6 @@ Reference ControlPolicy::reference(const Place& place, double seconds, double ah
   const Eigen::AngleAxisd pitch(kPitch * bow(seconds), Eigen::Vector3d::UnitY());
   reference.X_WB.R = yaw_rotation(yaw) * Eigen::Quaterniond(pitch);
   return reference;
-}
-
-Eigen::VectorXd ControlPolicy::reached(int side, const Eigen::Vector3d& p_B) {
-  Eigen::VectorXd q = robot_->neutral;
-  reach(side, p_B, 80, q);
-  return q;
-}
-
-void ControlPolicy::stretch(int side, const Eigen::Vector3d& from_shoulder, bool before, Eigen::VectorXd& q) {
-  const double length = std::max(from_shoulder.norm(), 1e-6);
-  Eigen::Vector3d target = shoulder_B_[side] + from_shoulder * std::min(1.0, arm_[side] / length);
-  if (before) target.x() = std::max(target.x(), 0.2 * arm_[side]);
-  reach(side, target, 8, q);
-}
-
-void ControlPolicy::reach(int side, const Eigen::Vector3d& p_B, int steps, Eigen::VectorXd& q) {
-  const std::vector<int>& joints = robot_->roles.arms[side];
-  const int frame = robot_->track_frame(side == 0 ? "lhand" : "rhand");
-  const int link = robot_->frames[frame].link;
-  constexpr double kDamping = 0.05, kStep = 0.1;  // [m]; radians follow from the arm's metres
-  for (int step = 0; step < steps; ++step) {
-    kinematics_.update({}, q);
-    const Eigen::Vector3d hand = kinematics_.frame_position(frame);
-    Eigen::Vector3d error = p_B - hand;
-    if (error.norm() > kStep) error *= kStep / error.norm();
-    kinematics_.point_jacobian(link, hand, J_);
-    Eigen::Matrix3d A = kDamping * kDamping * Eigen::Matrix3d::Identity();
-    for (const int joint : joints) A += J_.col(6 + joint) * J_.col(6 + joint).transpose();
-    const Eigen::Vector3d force = A.ldlt().solve(error);
-    for (const int joint : joints)
-      q[joint] =
-          std::clamp(q[joint] + J_.col(6 + joint).dot(force), robot_->joints[joint].lower, robot_->joints[joint].upper);
-  }
 }
 
 void ControlPolicy::copy_arm(int side, const Eigen::VectorXd& from, double share, Eigen::VectorXd& q) const {

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/policies/arm_reach.h"
 #include "duet/policies/policy.h"
-#include "duet/robots/kinematics.h"
 
 namespace duet {
 
@@ -73,23 +73,15 @@ class ControlPolicy final : public Policy {
   void mirror(const ObservationFrame& frame, const Place& place);
   // Looks whether the partner has raised a hand; one that does not wait is awake from the begin.
   void watch(const ObservationFrame& frame);
-  // As `reach`, of a place seen from the shoulder: at most as far as the arm is long and, where asked for, before it.
-  void stretch(int side, const Eigen::Vector3d& from_shoulder, bool before, Eigen::VectorXd& q);
-  // Moves the arm's joints in `q` so that its hand comes to `p_B`, a place in the base's frame. [m]
-  void reach(int side, const Eigen::Vector3d& p_B, int steps, Eigen::VectorXd& q);
-  [[nodiscard]] Eigen::VectorXd reached(int side, const Eigen::Vector3d& p_B);
   void copy_arm(int side, const Eigen::VectorXd& from, double share, Eigen::VectorXd& q) const;
 
   std::shared_ptr<const RobotModel> robot_;
   std::string_view name_;
   ControlScript script_, now_;  // as declared; for this episode's task
-  Kinematics kinematics_;
-  Eigen::MatrixXd J_;
-  std::array<Eigen::Vector3d, 2> shoulder_B_;  // in the neutral pose
-  std::array<double, 2> arm_ = {};             // [m]
+  ArmReach arms_;
   Poses poses_;
-  Eigen::VectorXd followed_;                // joints of the arms that follow or mirror
-  std::array<double, 2> lowest_hand_ = {};  // of the partner over its root so far [m]
+  Eigen::VectorXd followed_;  // joints of the arms that follow or mirror
+  HandWatch partner_;
   bool awake_ = false;
   double leaning_ = 0.0;  // of a mirrored trunk, as bow()
   RobotState start_;

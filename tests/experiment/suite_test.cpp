@@ -147,6 +147,19 @@ TEST(Suite, ControllersThatAreNotOnesAreRefused) {
       test::thrown_message<std::invalid_argument>([&] { set_controller_option(suite, "vmc", "network", "x"); }));
 }
 
+// Rows and tables tell policies apart by their names.
+TEST(Suite, APolicyWithTheHandServoSaysSoInItsName) {
+  const auto named = [](const std::string& name, const std::string& servo) {
+    std::string yaml = kMinimal;
+    return yaml.replace(yaml.find("[replay]"), 8,
+                        "[{name: " + name + ", use: replay, options: {hand_servo: " + servo + "}}]");
+  };
+  EXPECT_NO_THROW(parse_suite(named("replay+servo", "true"), "s.yaml"));
+  EXPECT_NO_THROW(parse_suite(named("replay", "false"), "s.yaml"));
+  EXPECT_THAT(test::thrown_message<InputError>([&] { parse_suite(named("replay", "true"), "s.yaml"); }),
+              HasSubstr("policy 'replay': hand_servo is on: expected a name that says `servo` ('replay+servo')"));
+}
+
 std::string with_synth(const std::string& synth, const std::string& tasks = "[handshake, wave]") {
   std::string yaml = kMinimal;
   yaml.replace(yaml.find("{per_task: 2}"), 13, synth);
