@@ -27,9 +27,14 @@ WORLDS = {**ENGINES, "mujoco3": "MuJoCo 3.14", "physx": "PhysX 5.6", "bullet_own
 POLICIES = {
     "dstar": "dstar",
     "dp": "dp",
+    "dstar_answer": "dstar, network `answer`",
+    "dstar_answer+servo": "dstar, network `answer`, with the servo",
+    "dp_answer": "dp, network `answer`",
+    "dp_answer+servo": "dp, network `answer`, with the servo",
     "dstar_shuffled": "dstar, partner of another clip",
     "retrieval": "retrieval",
     "replay": "replay (knows the motion)",
+    "replay+servo": "replay, with the servo",
     "null": "null (stands still)",
 }
 CONTROLS = {"canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)"}
