@@ -40,7 +40,8 @@ std::vector<MetricColumn> units_in(const std::string& file) {
 // The suite of a published table: what this room does not know of it is as the file has it; the roles are those of the
 // registry.
 RankingSuite suite_in(const std::string& file) {
-  RankingSuite suite{.roles = {{"replay", {ArmRole::kOracle, "knows the motion"}}}};
+  const PolicyRole knows{ArmRole::kOracle, "knows the motion"};
+  RankingSuite suite{.roles = {{"replay", knows}, {"replay+servo", knows}}};
   for (const std::string& line : lines_of(read_file(file))) {
     if (line.find(",suite,") == std::string::npos) continue;
     suite.label = line.find('"') != std::string::npos ? line.substr(line.find('"')) : line.substr(line.rfind(',') + 1);
