@@ -92,7 +92,7 @@ class Adaptation {
   Pose pelvis(int t) { return base_is_pelvis(robot_) ? root(t) : root(t) * pelvis_in_base(robot_, motion_.q.col(t)); }
   // The pelvis upright over where it is in the middle of the act: a person may still be walking in its first frames.
   Pose pelvis_at_act() {
-    const Pose stance = robot_.standing_state(pelvis((phases_.act_begin + phases_.act_end) / 2)).X_WB;
+    Pose stance = robot_.standing_state(pelvis((phases_.act_begin + phases_.act_end) / 2)).X_WB;
     if (base_is_pelvis(robot_)) return stance;
     const double lower = pelvis_in_base(robot_, robot_.neutral).p.z();
     return {stance.R, stance.p + Eigen::Vector3d(0.0, 0.0, lower)};

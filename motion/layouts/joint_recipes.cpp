@@ -388,6 +388,7 @@ std::string plain_value(std::string_view text) {
 
 std::vector<std::string> without_prefix(const std::vector<std::string>& names) {
   std::vector<std::string> plain;
+  plain.reserve(names.size());
   for (const std::string& name : names) plain.push_back(after_colon(name));
   const std::string longest(shared_prefix(plain));
   if (longest.empty()) return plain;

@@ -77,7 +77,8 @@ PolicyInfo function_info(const std::string& name) {
           "A function of Python that is called for all waiting episodes at once (duet.evaluate)",
           {{"source", "", "SHA-256 of what the function is"}}};
 }
-PolicyMaker function_maker(const std::string&, Robot, const PolicyOptions&) {
+PolicyMaker function_maker(const std::string&, Robot,  // NOLINT(performance-unnecessary-value-param): as all makers
+                           const PolicyOptions&) {
   throw MissingError("policy 'python' is a function: only the program that has it can run its episodes");
 }
 constexpr Entry kFunction = {"python", function_info, function_maker, no_files};
@@ -150,8 +151,8 @@ ServoOption take_servo(const std::string& name, PolicyOptions& options) {
   return read_options("policy", name, servo_options(), taken);
 }
 
-PolicyMaker servoed(PolicyMaker maker, const Robot& robot) {
-  return [maker = std::move(maker), robot] { return with_hand_servo(maker(), robot); };
+PolicyMaker servoed(PolicyMaker maker, Robot robot) {
+  return [maker = std::move(maker), robot = std::move(robot)] { return with_hand_servo(maker(), robot); };
 }
 
 }  // namespace
@@ -202,7 +203,7 @@ PolicyMaker policy_maker(const std::string& name, Robot robot, const PolicyOptio
   PolicyOptions own = options;
   const bool servo = takes_servo(entry) && take_servo(name, own).on;
   PolicyMaker maker = entry.maker(name, robot, own);
-  return servo ? servoed(std::move(maker), robot) : maker;
+  return servo ? servoed(std::move(maker), std::move(robot)) : maker;
 }
 
 std::unique_ptr<Policy> make_policy(const std::string& name, Robot robot, const PolicyOptions& options) {
