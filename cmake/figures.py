@@ -34,7 +34,7 @@ POLICIES = {
     "dstar_shuffled": "dstar, partner of another clip",
     "retrieval": "retrieval",
     "replay": "replay (knows the motion)",
-    "replay+servo": "replay, with the servo",
+    "replay+servo": "replay (knows the motion), with the servo",
     "null": "null (stands still)",
 }
 CONTROLS = {"canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)"}

@@ -175,10 +175,9 @@ void add_body(const SmoothedAgents& agents, DetectorResult& result) {
 
 }  // namespace
 
-ActWindow act_window(const Recording& recording) {
-  const double rate = recording.rate_hz;
-  return {recording.phases.act_begin - static_cast<int>(std::lround(kEarlier * rate)),
-          recording.phases.act_end + static_cast<int>(std::lround(kLater * rate))};
+ActWindow act_window(const Phases& phases, double rate_hz) {
+  return {phases.act_begin - static_cast<int>(std::lround(kEarlier * rate_hz)),
+          phases.act_end + static_cast<int>(std::lround(kLater * rate_hz))};
 }
 
 PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& robot, const HumanBody& human,

@@ -28,7 +28,7 @@ struct PartnerTouch {
 struct ActWindow {
   int begin = 0, end = 0;  // [begin, end)
 };
-ActWindow act_window(const Recording& recording);
+ActWindow act_window(const Phases& phases, double rate_hz);
 
 PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& robot, const HumanBody& human,
                            const ActWindow& window, double rate_hz);

@@ -22,7 +22,7 @@ class ArmReach {
   [[nodiscard]] double length(int side) const { return length_[side]; }                        // [m]
   [[nodiscard]] Eigen::Vector3d shoulder(int side, const Eigen::VectorXd& q);
   [[nodiscard]] Eigen::Vector3d hand(int side, const Eigen::VectorXd& q);
-  // Of the neutral pose.
+  // The head in the neutral pose.
   [[nodiscard]] Eigen::Vector3d head();
   // Moves the arm's joints in `q`, within their limits, so that its hand comes to `p_B`: `steps` steps of damped least
   // squares of at most 0.1 m each.

@@ -90,8 +90,8 @@ class Policy {
   // policy knows more than its anchors can say: half a second between anchors leaves 75 % of a swing of 0.5 Hz and 23 %
   // of one of 1 Hz (docs/deviations.md). Empty: no plan this time (see PolicyFaults).
   virtual std::vector<Reference> plan(const Observation& observation);
-  // What cannot wait for the next plan: a policy that corrects is asked at every tick, once its plans are fused, for
-  // the last word on the reference that the controller gets (policies/hand_servo.h).
+  // A correction that cannot wait for the next plan: a policy that corrects has, at every tick, once its plans are
+  // fused, the last word on the reference that the controller gets (policies/hand_servo.h).
   [[nodiscard]] virtual bool corrects() const { return false; }
   virtual void correct(const Observation&, Reference&) {}
   [[nodiscard]] virtual PolicyFaults faults() const { return {}; }  // since reset

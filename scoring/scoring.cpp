@@ -74,8 +74,9 @@ std::optional<PartnerTouch> touch_of(const EpisodeRow& row) {
 
 void add_contacts(const Rollout& rollout, const PairedMotion& clip, const RobotModel& robot, EpisodeRow& row) {
   if (!rollout.safety) return;
-  const PartnerTouch touch = partner_touch(*rollout.safety, robot, make_human_body(bone_lengths(clip.partner)),
-                                           act_window(rollout.recording), rollout.recording.rate_hz);
+  const PartnerTouch touch =
+      partner_touch(*rollout.safety, robot, make_human_body(bone_lengths(clip.partner)),
+                    act_window(rollout.recording.phases, rollout.recording.rate_hz), rollout.recording.rate_hz);
   row.forces[kHandsTouch] = touch.hands_s;
   row.forces[kTrunkTouch] = touch.trunk_s;
   row.contact_peak_n = rollout.safety->peak_force;
@@ -114,7 +115,7 @@ Verdict interaction_verdict(const Recording& recording, const ScoringReference& 
   InteractionEvidence evidence{machine,
                                human,
                                touch_of(row),
-                               act_window(recording),
+                               act_window(recording.phases, recording.rate_hz),
                                std::nullopt,
                                recording.phases.act_begin,
                                recording.outcome == Outcome::kOk};

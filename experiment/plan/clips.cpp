@@ -146,10 +146,11 @@ ClipPadding vary_standing(const SyntheticClip& source, SynthesisOptions& options
   constexpr double kLooksFor = 5.0, kMeanPatience = 1.0;  // and before a partner who stands still [s]
   Random random(source.seed, stream_key({"stands", to_string(source.task), std::to_string(source.index)}));
   const bool memoryless = source.like == Likeness::kVaried;
-  double before = memoryless ? -kStandingBefore * std::log1p(-random.uniform()) : random.uniform(kShortest, kLongest);
+  const auto drawn = [&](double mean) { return -mean * std::log1p(-random.uniform()); };
+  double before = memoryless ? drawn(kStandingBefore) : random.uniform(kShortest, kLongest);
   const double still = definition_of(source.task).act.varied.still;
   if (memoryless && still > 0.0) options.still = random.chance(still);
-  if (options.still.value_or(false)) before = kLooksFor - kMeanPatience * std::log1p(-random.uniform());
+  if (options.still.value_or(false)) before = kLooksFor + drawn(kMeanPatience);
   if (random.chance(0.5)) {
     options.before = before;
     options.wait = std::nullopt;

@@ -29,6 +29,15 @@ DemonstrationOptions small_options() {
   return options;
 }
 
+// The meant motions alone, one start of each clip.
+DemonstrationOptions unfollowed(Likeness like, int clips) {
+  DemonstrationOptions options = small_options();
+  options.clips = {{like, clips}};
+  options.starts = 1;
+  options.engine = "";
+  return options;
+}
+
 DemonstrationSet made(const DemonstrationOptions& options) {
   Progress quiet(Progress::Style::kQuiet);
   return *make_demonstrations(test::g1(), options, quiet, [] { return false; });
@@ -163,11 +172,7 @@ TEST(LateAct, IsPutOffByWhatTheRobotWasLate) {
 }
 
 TEST(MakeDemonstrations, BeforeAStillPartnerNobodyBeginsUntilHeHasLookedForFiveSeconds) {
-  DemonstrationOptions options = small_options();
-  options.engine = "";
-  options.starts = 1;
-  options.clips = {{Likeness::kVaried, 8}};
-  const DemonstrationSet set = made(options);
+  const DemonstrationSet set = made(unfollowed(Likeness::kVaried, 8));
   int still = 0;
   for (const Demonstration& entry : set.list) {
     const auto partner = set.partner.middleCols(entry.begin, entry.frames);
@@ -181,11 +186,7 @@ TEST(MakeDemonstrations, BeforeAStillPartnerNobodyBeginsUntilHeHasLookedForFiveS
 }
 
 TEST(MakeDemonstrations, PeopleWaitForNoLengthThatCouldBeCounted) {
-  DemonstrationOptions options = small_options();
-  options.engine = "";
-  options.starts = 1;
-  options.clips = {{Likeness::kPeople, 6}};
-  const DemonstrationSet set = made(options);
+  const DemonstrationSet set = made(unfollowed(Likeness::kPeople, 6));
   std::vector<int> begins;
   for (const Demonstration& entry : set.list) begins.push_back(entry.phases.act_begin);
   const auto [shortest, longest] = std::ranges::minmax(begins);

@@ -20,6 +20,7 @@
 #include "duet/policies/phase_adaptation.h"
 #include "duet/robots/roles.h"
 #include "duet/rollout/act_episode.h"
+#include "duet/rollout/perturbations/partner_perturbation.h"
 #include "duet/rows/episode_row.h"
 
 namespace duet {
@@ -51,13 +52,6 @@ int ahead(const PairedMotion& clip, const RobotMotion& motion, const RobotModel&
   return std::max(0, *partner + ticks_of(reaction) - *own);
 }
 
-// Frames of a track from `begin` on; the last one stays where there are no more.
-PointTracks frames_from(const PointTracks& track, int begin, int frames) {
-  PointTracks cut(frames, track.points());
-  for (int t = 0; t < frames; ++t) cut.frame(t) = track.frame(std::min(begin + t, track.frames() - 1));
-  return cut;
-}
-
 Take take_of(const PairedMotion& clip, const RobotModel& robot, const DemonstrationOptions& options,
              std::uint64_t seed) {
   Take take;
@@ -67,17 +61,17 @@ Take take_of(const PairedMotion& clip, const RobotModel& robot, const Demonstrat
   if (options.answers) adaptation.walks = random.uniform(kSlowWalk, kQuickWalk);
   take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, adaptation, seed);
   if (options.answers) take.adapted.clip_frame += ahead(clip, take.adapted.motion, robot, random);
-  take.partner = frames_from(clip.partner.joints, take.adapted.clip_frame, take.adapted.motion.frames());
+  take.partner = partner_motion(clip.partner, std::nullopt, take.adapted.phases, take.adapted.clip_frame,
+                                take.adapted.motion.frames())
+                     .joints;
   return take;
 }
 
 // Whether the meant motion passes the rule beside a partner whom it passes through.
 bool passes(const Take& take, const RobotModel& robot) {
-  const Phases& act = take.adapted.phases;
-  const int later = ticks_of(1.0);
   return judge_interaction(take.clip->task, {.performer = robot_agent(robot, take.adapted.motion),
                                              .partner = human_agent(take.partner),
-                                             .window = {act.act_begin - later / 2, act.act_end + later}})
+                                             .window = act_window(take.adapted.phases, kTickRate)})
       .success;
 }
 

@@ -56,8 +56,8 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
 // Frames, at most a second, by which the robot did the act later than it was meant to: those at which its upper body is
 // nearest to the meant one. 0 for a robot that did nothing.
 int act_lag(const AdaptedMotion& meant, const std::vector<RobotState>& did, const RobotModel& robot);
-// The act and what follows so many frames later; the robot goes on waiting until then. Who acts late is not asked to be
-// done with it at the time that was meant: that would teach it to leave the act out.
+// The act and what follows so many frames later; the robot goes on waiting until then. A robot that acts late is not
+// asked to be done at the time that was meant: that would teach it to leave the act out.
 AdaptedMotion put_off(const AdaptedMotion& meant, int frames);
 
 // "digest  clip_id" of every clip of a suite, with a first line that says which: the content of a test split.
