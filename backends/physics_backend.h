@@ -92,8 +92,9 @@ class ImplicitLaw {
   bool saturate(const Eigen::VectorXd& a);
 
   [[nodiscard]] const Kinematics& kinematics() const { return dynamics_.kinematics(); }
-  [[nodiscard]] const TreeFactor& factor() const { return factor_; }        // of M + S
-  [[nodiscard]] const Eigen::VectorXd& acceleration() const { return a_; }  // of solve(), (6 + dof)
+  [[nodiscard]] const TreeFactor& factor() const { return factor_; }         // of M + S
+  [[nodiscard]] const Eigen::VectorXd& acceleration() const { return a_; }   // of solve(), (6 + dof)
+  [[nodiscard]] const Eigen::VectorXd& inertia() const { return inertia_; }  // s: armature + dt kd + dt^2 kp [kg m^2]
   // Q + t0 - b, the right-hand side for a force Q.
   void forces(const Eigen::VectorXd& Q, Eigen::VectorXd& out) const;
   // The torques by which an engine that knows only M reaches the acceleration `a`: t0 - s a. [N m]

@@ -45,6 +45,8 @@ constexpr std::array kScenes = {
                      measure_skin_bounce, "", nullptr, true},
     ConformanceScene{"skin-rub", "a partner's limb that slides past a hand drags it by the pair's friction",
                      measure_skin_rub, "", nullptr, true},
+    ConformanceScene{"skin-strike", "a driven hand strikes a partner's limb: skin and torque law give way in one step",
+                     measure_skin_strike, kLawGroup, nullptr, true},
     ConformanceScene{"skin-carry", "a partner that moves on carries a sledge along, by mu g until both move alike",
                      measure_skin_carry, "", nullptr, true},
     ConformanceScene{"self-rub", "a forearm pressed on a turning thigh brakes it by the pair's friction",

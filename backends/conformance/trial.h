@@ -131,6 +131,7 @@ void measure_self_collision(Trial& trial);
 std::string lacks_hand_poses(const RobotModel& robot);  // the poses hand_before_trunk and hand_in_trunk
 // two_body_scenes.cpp
 void measure_skin_rub(Trial& trial);
+void measure_skin_strike(Trial& trial);
 void measure_skin_carry(Trial& trial);
 void measure_self_rub(Trial& trial);
 // standing_scenes.cpp

@@ -1,7 +1,8 @@
-// Scenes of two bodies that rub: a hand on a partner that slides past, a load that a moving partner carries along, and
-// a forearm on a thigh of the same robot.
+// Scenes of two bodies: a hand on a partner that slides past, a hand that strikes one, a load that a moving partner
+// carries along, and a forearm on a thigh of the same robot.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "duet/backends/conformance/reference.h"
@@ -103,6 +104,85 @@ void measure_skin_rub(Trial& trial) {
                   "friction is against the slip; 2 % of it");
     trial.absolute(name("torque of the shoulder"), "N m", dt, -found.torque, lever * drag * course.d_W.y(),
                    0.02 * lever * drag, "holds the arm against mu K depth; 2 % of the largest");
+  }
+}
+
+// A hand with rotor inertia that a PD drives into the partner's limb, beside it: skin and torque law in one implicit
+// step.
+
+namespace {
+
+constexpr double kStrikeArmature = 0.1, kStrikeSpeed = 3.0, kStrikeTarget = 0.2;  // [kg m^2], [rad/s], [rad]
+constexpr double kStrikeStiffness = 200.0, kStrikeDamping = 30.0;                 // [N m/rad], [N m s/rad]
+constexpr double kFirstDepth = 1e-4, kStrikeWatched = 0.03;                       // [m], [s]
+
+struct Strike {
+  double peak = 0.0, torque = 0.0, speed = 0.0;  // [N]; of the shoulder in the first step [N m]; at the end [rad/s]
+};
+
+// The recursion of both at one joint, with the lever as it is in the middle.
+Strike discrete_strike(double h, double inertia) {
+  const double damped = h * kStrikeDamping + h * h * kStrikeStiffness;
+  const double give = h * kLimbSkin.stiffness + kLimbSkin.damping;
+  Strike found;
+  double q = 0.0, v = kStrikeSpeed;
+  for (int i = 0; i < steps_in(kStrikeWatched, h); ++i) {
+    const double depth = kFirstDepth + kReach * q;
+    const double drive = kStrikeStiffness * (kStrikeTarget - q - h * v) - kStrikeDamping * v;
+    const double carried = inertia + kStrikeArmature + damped;
+    const bool touches = depth > 0.0;
+    const double push = touches ? kLimbSkin.stiffness * depth : 0.0, resists = touches ? give : 0.0;
+    const double next = (carried * v + h * (drive - kReach * push)) / (carried + h * kReach * kReach * resists);
+    found.peak = std::max(found.peak, push + resists * kReach * next);
+    if (i == 0) found.torque = drive - damped * (next - v) / h;
+    v = next;
+    q += h * v;
+  }
+  found.speed = v;
+  return found;
+}
+
+Strike strike_in(const Trial& trial, double dt) {
+  auto robot = std::make_shared<RobotModel>(*held_hand());
+  robot->joints[0].armature = kStrikeArmature;
+  Scene scene = trial.scene(robot, dt);
+  scene.gravity.setZero();
+  scene.partner = PartnerMode::kSolid;
+  scene.friction.robot_human = 0.0;  // the hand turns along the limb as it goes
+  scene.human.capsules = {limb("limb", kLeftElbow, kLeftWrist)};
+  World world(trial, scene);
+  RobotState start = state_at(world.robot(), {0.0, 0.0, kInTheAir});
+  start.v[0] = kStrikeSpeed;
+  world.reset(start);
+  HumanJoints joints = HumanJoints::Zero();
+  lay(joints, scene.human.capsules[0], {kReach, kReachRadius + kLimbRadius - kFirstDepth, kInTheAir},
+      Eigen::Vector3d::UnitZ());
+  world.backend().set_partner(joints, HumanJoints::Zero());
+  JointCommand command = no_torque(world.robot());
+  command.q_target[0] = kStrikeTarget;
+  command.kp[0] = kStrikeStiffness;
+  command.kd[0] = kStrikeDamping;
+  Strike found;
+  for (int i = 0; i < steps_in(kStrikeWatched, dt); ++i) {
+    world.step(command);
+    found.peak = std::max(found.peak, -world.force_of(ContactSide::kHuman).y());
+    if (i == 0) found.torque = world.backend().torques()[0];
+  }
+  found.speed = world.state().v[0];
+  return found;
+}
+
+}  // namespace
+
+void measure_skin_strike(Trial& trial) {
+  const RobotLink& arm = held_hand()->links[1];
+  const double inertia = arm.inertia(2, 2) + arm.mass * kReach * kReach;
+  for (const double dt : trial.step_sizes()) {
+    const Strike found = strike_in(trial, dt), expected = discrete_strike(dt, inertia);
+    trial.relative("peak force", "N", dt, found.peak, expected.peak, 0.005, "implicit step of skin and law together");
+    trial.absolute("torque of the shoulder in the first step", "N m", dt, found.torque, expected.torque, 0.5,
+                   "the same");
+    trial.absolute("speed after 30 ms", "rad/s", dt, found.speed, expected.speed, 0.01, "the same");
   }
 }
 

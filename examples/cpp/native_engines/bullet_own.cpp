@@ -4,6 +4,7 @@
 #include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
 #include <BulletDynamics/Featherstone/btMultiBodyJointLimitConstraint.h>
+#include <BulletDynamics/Featherstone/btMultiBodyJointMotor.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 #include <btBulletDynamicsCommon.h>
 
@@ -63,6 +64,27 @@ class World final : public btMultiBodyDynamicsWorld {
   duet::PairFriction friction_;
 };
 
+// The row of a joint's motor, made soft: Bullet's target velocity, and the law's inertia as cfm.
+class LawMotor final : public btMultiBodyJointMotor {
+ public:
+  LawMotor(btMultiBody* body, int link) : btMultiBodyJointMotor(body, link, 0.0, SIMD_INFINITY) {}
+  double target = 0.0, inertia = 0.0;  // [rad/s, kg m^2]
+
+  void createConstraintRows(btMultiBodyConstraintArray& rows, btMultiBodyJacobianData& data,
+                            const btContactSolverInfo& info) override {
+    const int before = rows.size();
+    if (inertia > 0.0) btMultiBodyJointMotor::createConstraintRows(rows, data, info);
+    if (rows.size() == before) return;
+    btMultiBodySolverConstraint& row = rows[before];
+    const double softness = 1.0 / inertia;
+    row.m_jacDiagABInv = 1.0 / (1.0 / row.m_jacDiagABInv + softness);
+    row.m_cfm = softness * row.m_jacDiagABInv;
+    row.m_rhs = (target - m_bodyA->getJointVel(m_linkA)) * row.m_jacDiagABInv;
+    row.m_lowerLimit = -SIMD_INFINITY;
+    row.m_upperLimit = SIMD_INFINITY;
+  }
+};
+
 class BulletOwn final : public own::OwnWorld, btOverlapFilterCallback {
  public:
   explicit BulletOwn(const duet::Scene& scene) : OwnWorld(scene), n_(robot().dof()) {
@@ -77,12 +99,14 @@ class BulletOwn final : public own::OwnWorld, btOverlapFilterCallback {
     make_body();
     make_ground();
     for (int link = 0; link <= n_; ++link) make_collider(link);
+    make_motors();
     make_limits();
     if (scene.partner == duet::PartnerMode::kSolid) make_partner();
     place();
   }
   ~BulletOwn() override {
     for (const auto& limit : limits_) world_->removeMultiBodyConstraint(limit.get());
+    for (const auto& motor : motors_) world_->removeMultiBodyConstraint(motor.get());
     world_->removeMultiBody(body_.get());
     for (const auto& capsule : capsules_) world_->removeRigidBody(capsule.get());
     for (const auto& object : objects_) world_->removeCollisionObject(object.get());
@@ -166,6 +190,14 @@ class BulletOwn final : public own::OwnWorld, btOverlapFilterCallback {
     world_->addCollisionObject(collider.get());
     shapes_.push_back(std::move(compound));
     objects_.push_back(std::move(collider));
+  }
+
+  void make_motors() {
+    for (int i = 0; i < n_; ++i) {
+      motors_.push_back(std::make_unique<LawMotor>(body_.get(), i));
+      world_->addMultiBodyConstraint(motors_.back().get());
+      motors_.back()->finalizeMultiDof();
+    }
   }
 
   void make_limits() {
@@ -255,12 +287,17 @@ class BulletOwn final : public own::OwnWorld, btOverlapFilterCallback {
 
   duet::Outcome advance(const duet::JointCommand& command) override {
     if (!find_torques(command)) return duet::Outcome::kDiverged;
-    for (int i = 0; i < n_; ++i) body_->addJointTorque(i, applied()[i]);
+    for (int i = 0; i < n_; ++i) {
+      body_->addJointTorque(i, applied()[i]);
+      motors_[i]->target = law_row(i).target;
+      motors_[i]->inertia = law_row(i).inertia;
+    }
     for (int link = 0; link <= n_ && pushes_.any(); ++link) push(link);
     place_partner();
     world_->stepSimulation(scene().dt, 0);
     read();
     if (!duet::speeds_are_sane(state_)) return duet::Outcome::kDiverged;
+    correct_torques();
     read_contacts();
     return duet::Outcome::kOk;
   }
@@ -333,6 +370,7 @@ class BulletOwn final : public own::OwnWorld, btOverlapFilterCallback {
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
   std::vector<std::unique_ptr<btCollisionObject>> objects_;
   std::vector<std::unique_ptr<btRigidBody>> capsules_;
+  std::vector<std::unique_ptr<LawMotor>> motors_;
   std::vector<std::unique_ptr<btMultiBodyJointLimitConstraint>> limits_;
 };
 

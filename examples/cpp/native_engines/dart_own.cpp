@@ -7,6 +7,7 @@
 #include <dart/collision/ode/OdeCollisionDetector.hpp>
 #include <dart/config.hpp>
 #include <dart/constraint/BoxedLcpConstraintSolver.hpp>
+#include <dart/constraint/ConstraintBase.hpp>
 #include <dart/constraint/ContactConstraint.hpp>
 #include <dart/constraint/DantzigBoxedLcpSolver.hpp>
 #include <dart/constraint/PgsBoxedLcpSolver.hpp>
@@ -93,6 +94,58 @@ class SkinContact final : public dart::constraint::ContactConstraint {
   std::size_t unit_row_ = 0;
 };
 
+// The joints' law as rows of DART's solver: impulses that leave v + impulse / inertia at its target.
+class LawRows final : public dart::constraint::ConstraintBase {
+ public:
+  struct Row {
+    dd::RevoluteJoint* joint;
+    double target, inertia;  // [rad/s, kg m^2]
+  };
+  explicit LawRows(dd::SkeletonPtr skeleton) : skeleton_(std::move(skeleton)) {}
+  void set(std::vector<Row> rows) {
+    rows_ = std::move(rows);
+    mDim = rows_.size();
+  }
+
+ protected:
+  void update() override {}
+  bool isActive() const override { return mDim > 0; }
+  dd::SkeletonPtr getRootSkeleton() const override { return ConstraintBase::getRootSkeleton(skeleton_); }
+  void getInformation(dart::constraint::ConstraintInfo* info) override {
+    for (std::size_t i = 0; i < mDim; ++i) {
+      info->x[i] = info->w[i] = 0.0;
+      info->findex[i] = -1;
+      info->lo[i] = -std::numeric_limits<double>::infinity();
+      info->hi[i] = std::numeric_limits<double>::infinity();
+      info->b[i] = rows_[i].target - rows_[i].joint->getVelocity(0);
+    }
+  }
+  void applyUnitImpulse(std::size_t index) override {
+    dd::RevoluteJoint* joint = rows_[index].joint;
+    skeleton_->clearConstraintImpulses();
+    joint->setConstraintImpulse(0, 1.0);
+    skeleton_->updateBiasImpulse(joint->getChildBodyNode());
+    skeleton_->updateVelocityChange();
+    joint->setConstraintImpulse(0, 0.0);
+    unit_ = index;
+  }
+  void getVelocityChange(double* change, bool with_cfm) override {
+    for (std::size_t i = 0; i < mDim; ++i) change[i] = rows_[i].joint->getVelocityChange(0);
+    if (with_cfm) change[unit_] += 1.0 / rows_[unit_].inertia;
+  }
+  void excite() override { skeleton_->setImpulseApplied(true); }
+  void unexcite() override { skeleton_->setImpulseApplied(false); }
+  void applyImpulse(double* impulse) override {
+    for (std::size_t i = 0; i < mDim; ++i)
+      rows_[i].joint->setConstraintImpulse(0, rows_[i].joint->getConstraintImpulse(0) + impulse[i]);
+  }
+
+ private:
+  dd::SkeletonPtr skeleton_;
+  std::vector<Row> rows_;
+  std::size_t unit_ = 0;
+};
+
 class DartOwn final : public own::OwnWorld {
  public:
   explicit DartOwn(const duet::Scene& scene) : OwnWorld(scene), n_(robot().dof()) {
@@ -111,6 +164,7 @@ class DartOwn final : public own::OwnWorld {
     skeleton_ = dd::Skeleton::create("robot");
     for (int link = 0; link <= n_; ++link) make_link(link);
     skeleton_->enableSelfCollisionCheck();
+    law_rows_ = std::make_shared<LawRows>(skeleton_);
     world_->addSkeleton(skeleton_);
     auto filter = std::make_shared<LinkFilter>();
     filter->robot = skeleton_.get();
@@ -232,7 +286,6 @@ class DartOwn final : public own::OwnWorld {
 
   // Points between robot and partner become constraints of the step, in an order that no space decides.
   void touch_partner() {
-    world_->getConstraintSolver()->removeAllConstraints();
     touched_.clear();
     if (capsules_.empty() || !partner_.present) return;
     place_partner();
@@ -291,6 +344,8 @@ class DartOwn final : public own::OwnWorld {
   duet::Outcome advance(const duet::JointCommand& command) override {
     if (!find_torques(command)) return duet::Outcome::kDiverged;
     for (int i = 0; i < n_; ++i) hinges_[i]->setForce(0, applied()[i]);
+    world_->getConstraintSolver()->removeAllConstraints();
+    add_law_rows();
     for (int link = 0; link <= n_ && pushes_.any(); ++link)
       if (const duet::ExternalForces::Push& push = pushes_.all()[link]; !push.f_W.isZero(0.0))
         bodies_[link]->addExtForce(push.f_W, push.p_L);
@@ -298,8 +353,17 @@ class DartOwn final : public own::OwnWorld {
     world_->step();
     read();
     if (!duet::speeds_are_sane(state_)) return duet::Outcome::kDiverged;
+    correct_torques();
     read_contacts();
     return duet::Outcome::kOk;
+  }
+
+  void add_law_rows() {
+    std::vector<LawRows::Row> rows;
+    for (int i = 0; i < n_; ++i)
+      if (const auto [target, inertia] = law_row(i); inertia > 0.0) rows.push_back({hinges_[i], target, inertia});
+    law_rows_->set(std::move(rows));
+    world_->getConstraintSolver()->addConstraint(law_rows_);
   }
 
   void read() {
@@ -352,6 +416,7 @@ class DartOwn final : public own::OwnWorld {
   int n_;
   dart::simulation::WorldPtr world_;
   dd::SkeletonPtr skeleton_;
+  std::shared_ptr<LawRows> law_rows_;
   dd::FreeJoint* base_ = nullptr;
   std::vector<dd::RevoluteJoint*> hinges_;
   std::vector<dd::BodyNode*> bodies_;

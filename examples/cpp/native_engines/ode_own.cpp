@@ -154,7 +154,25 @@ class OdeOwn final : public own::OwnWorld {
         dJointSetHingeParam(hinge, dParamLoStop, joint.lower);  // refused above where it was over the old upper one
       }
       hinges_.push_back(hinge);
+      motors_.push_back(make_motor(i, axis));
     }
+  }
+
+  // A motor beside the hinge: the hinge's own becomes a torque of any size where a stop is met.
+  dJointID make_motor(int i, const Eigen::Vector3d& axis) {
+    const dJointID motor = dJointCreateAMotor(world_, nullptr);
+    dJointAttach(motor, bodies_[i + 1], bodies_[robot().links[i + 1].parent]);
+    dJointSetAMotorMode(motor, dAMotorUser);
+    dJointSetAMotorNumAxes(motor, 1);
+    constexpr int kOfFirstBody = 1;
+    dJointSetAMotorAxis(motor, 0, kOfFirstBody, axis.x(), axis.y(), axis.z());
+    return motor;
+  }
+  void set_motor(int i) {
+    const auto [target, inertia] = law_row(i);
+    dJointSetAMotorParam(motors_[i], dParamFMax, inertia > 0.0 ? dInfinity : 0.0);
+    dJointSetAMotorParam(motors_[i], dParamVel, target);
+    dJointSetAMotorParam(motors_[i], dParamCFM, inertia > 0.0 ? scene().dt / inertia : 0.0);
   }
 
   void make_partner() {
@@ -277,7 +295,10 @@ class OdeOwn final : public own::OwnWorld {
   duet::Outcome advance(const duet::JointCommand& command) override {
     enter();
     if (!find_torques(command)) return duet::Outcome::kDiverged;
-    for (int i = 0; i < n_; ++i) dJointAddHingeTorque(hinges_[i], applied()[i]);
+    for (int i = 0; i < n_; ++i) {
+      dJointAddHingeTorque(hinges_[i], applied()[i]);
+      set_motor(i);
+    }
     kinematics_.update(state_.X_WB, state_.q);
     for (int l = 0; l < links() && pushes_.any(); ++l) {
       const duet::ExternalForces::Push& push = pushes_.all()[l];
@@ -296,6 +317,7 @@ class OdeOwn final : public own::OwnWorld {
       if (!(eigen(dBodyGetLinearVel(body)).norm() < duet::kDivergedSpeed)) return duet::Outcome::kDiverged;
     read();
     if (!duet::speeds_are_sane(state_)) return duet::Outcome::kDiverged;
+    correct_torques();
     read_contacts();
     return duet::Outcome::kOk;
   }
@@ -365,7 +387,7 @@ class OdeOwn final : public own::OwnWorld {
   dSpaceID space_ = nullptr;
   dJointGroupID group_ = nullptr;
   std::vector<dBodyID> bodies_;
-  std::vector<dJointID> hinges_;
+  std::vector<dJointID> hinges_, motors_;
   std::vector<dGeomID> capsules_;
   std::vector<Found> found_;
   std::vector<Touched> touched_;

@@ -1,5 +1,5 @@
-// The modules share this: the torque law as torques for a world that takes nothing else, which links may touch,
-// and the form in which contacts are reported. Scenes, rows and solvers are each engine's own.
+// The modules share this: the torque law as torques and as rows for an engine's solver, which links may touch, and the
+// form in which contacts are reported. Scenes, contact rows and solvers are each engine's own.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,6 +26,7 @@ class OwnWorld : public duet::PhysicsBackend {
         links_(static_cast<int>(scene.robot->links.size())),
         touching_(links_ * links_, 0),
         applied_(Eigen::VectorXd::Zero(scene.robot->dof())),
+        v_before_(Eigen::VectorXd::Zero(scene.robot->dof())),
         of_contacts_(Eigen::VectorXd::Zero(6 + scene.robot->dof())),
         Q_(Eigen::VectorXd::Zero(6 + scene.robot->dof())),
         J_(Eigen::MatrixXd::Zero(3, 6 + scene.robot->dof())) {
@@ -42,10 +43,26 @@ class OwnWorld : public duet::PhysicsBackend {
   [[nodiscard]] bool may_touch(int a, int b) const { return touching_[a * links_ + b] != 0; }
 
   // Motor torques into torques_, and into applied_ those under which a world that knows no armature reaches the law's
-  // acceleration, with the contact forces of the step before. False where the state has diverged.
+  // acceleration if contact forces stay what they were in the step before. False where the state has diverged.
   [[nodiscard]] bool find_torques(const duet::JointCommand& command) {
+    v_before_ = state_.v;
     if (!law_.begin(state_, command)) return false;
     return solve_law();
+  }
+  // What the contacts of this step change of that is a row of the engine's solver for each joint: at the end of the
+  // step v + impulse / inertia = target, with the impulse [N m s] on the joint. The motor's limit holds in applied_, so
+  // that a blow can pass it for one step. `inertia` is 0 [kg m^2] where law and robot have none: no row.
+  struct LawRow {
+    double target, inertia;
+  };
+  [[nodiscard]] LawRow law_row(int i) const {
+    return {v_before_[i] + scene().dt * law_.acceleration()[6 + i], law_.inertia()[i]};
+  }
+  // Motor torques of the step that was, from state_.v: with what the rows gave.
+  void correct_torques() {
+    Q_ = law_.acceleration();
+    Q_.tail(v_before_.size()) = (state_.v - v_before_) / scene().dt;
+    law_.torques(Q_, torques_);
   }
   // The same inside a step, where contacts_ are those of `state`.
   [[nodiscard]] bool find_torques(const duet::RobotState& state, const duet::JointCommand& command) {
@@ -56,7 +73,6 @@ class OwnWorld : public duet::PhysicsBackend {
   [[nodiscard]] const Eigen::VectorXd& applied() const { return applied_; }
 
   // `f_W` acts on link i; j is another link, or -1 for the ground or the capsule `capsule` of the partner (-1: none).
-  // Of
   // two links the one that the declared pair names first is reported as touched.
   void report(int i, int j, int capsule, const Eigen::Vector3d& p_W, const Eigen::Vector3d& f_W, double depth) {
     if (contacts_.size() == narrow_phase_.capacity())
@@ -124,7 +140,7 @@ class OwnWorld : public duet::PhysicsBackend {
   duet::ImplicitLaw law_;
   int links_;
   std::vector<char> touching_;
-  Eigen::VectorXd applied_, of_contacts_, Q_;
+  Eigen::VectorXd applied_, v_before_, of_contacts_, Q_;
   Eigen::MatrixXd J_;
 };
 
