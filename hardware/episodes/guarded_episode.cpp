@@ -29,6 +29,7 @@ GuardedEpisode guarded_episode(const RolloutSetup& setup, const RobotModel& robo
   episode.act_begin = setup.reference.phases.act_begin;
   episode.act_end = setup.reference.phases.act_end;
   episode.watch = options.watch;
+  episode.keeps_distance = options.config.twin && options.config.person;
   if (options.config.twin) episode.person = partner_of_clip(partner);  // a robot's camera speaks for itself
   return episode;
 }
@@ -134,7 +135,9 @@ Suite suite_of_clip(const std::string& clip, const std::string& policy, const st
 
 namespace {
 
-constexpr int kPersonRate = 30;  // [Hz]
+constexpr int kPersonRate = 30;    // [Hz]
+constexpr double kStandOff = 3.0;  // of a person while the robot is stood up, beyond where the clip has them [m]
+constexpr double kWalkUp = 1.2;    // a person's walking pace [m/s]
 
 // Whether a picture of 30 in a second falls into this tick.
 bool sees_at(int tick) { return tick == 0 || tick * kPersonRate / 50 != (tick - 1) * kPersonRate / 50; }
@@ -187,19 +190,25 @@ void GuardedWorld::plan(const VelocityCommand& root, const Eigen::VectorXd& q, b
   (void)link_.send(message_to_guard_);
 }
 
-void GuardedWorld::begin(const RobotState& start) {
-  if (!next()) throw std::runtime_error(message_);
+void GuardedWorld::wait_for_run(const Pose& start) {
   const double asked_at = report_.now;
-  message_to_guard_.goal.reset();
-  while (report_.state != SafetyState::kRun) {
-    if (report_.state >= SafetyState::kHold || report_.now - asked_at > episode_.most_wait)
+  stand_off_ = episode_.keeps_distance ? kStandOff : 0.0;
+  while (report_.state != SafetyState::kRun || stand_off_ > 0.0) {
+    if (report_.state >= SafetyState::kDamp || report_.now - asked_at > episode_.most_wait)
       throw std::runtime_error(fmt::format("{} does not run: it is at {} after {:.1f} s", link_.name(),
                                            place_of(report_), report_.now - asked_at));
-    lay_world(start.X_WB);
+    if (report_.state == SafetyState::kRun) stand_off_ = std::max(stand_off_ - kWalkUp * kTick, 0.0);
+    lay_world(start);
     show_person(0);
     plan({0.0, 0.0, 0.0, episode_.limits.height}, robot_->neutral, false);
     if (!next()) throw std::runtime_error(message_);
   }
+}
+
+void GuardedWorld::begin(const RobotState& start) {
+  if (!next()) throw std::runtime_error(message_);
+  message_to_guard_.goal.reset();
+  wait_for_run(start.X_WB);
   lay_world(start.X_WB);
   velocity_.reset();
   missed_ = 0;
@@ -233,6 +242,11 @@ void GuardedWorld::show_person(int tick) {
   if (!episode_.person || !episode_.person(tick, joints)) return;
   const Eigen::Quaterniond R_OE = yaw_rotation(yaw_OE_);
   for (int j = 0; j < joints.cols(); ++j) person_.joints.col(j) = p_OE_ + R_OE * joints.col(j);
+  if (stand_off_ > 0.0) {
+    Eigen::Vector3d away = person_.joints.col(0) - report_.robot.X_WB.p;
+    away.z() = 0.0;
+    person_.joints.colwise() += stand_off_ * away.normalized();
+  }
   ++person_.sequence;
   (void)link_.send(person_);
 }

@@ -35,6 +35,8 @@ struct GuardedEpisode {
   std::vector<int> joints;         // that the guard's limiter moves: what is executed of the reference beside the root
   int act_begin = 0, act_end = 0;  // ticks in which the task's parts may touch
   PartnerSource person = {};       // empty: the guard hears of nobody
+  bool keeps_distance = false;     // the guard minds the person, who comes near once the robot runs: until then it
+                                   // would not even stand up beside them
   double most_wait = 30.0;         // for the guard to run, by its clock [s]
   std::function<void(const GuardReport&)> watch = {};  // of each change of state, for displays
 };
@@ -66,6 +68,7 @@ class GuardedWorld final : public World {
 
  private:
   bool next();
+  void wait_for_run(const Pose& start);
   void plan(const VelocityCommand& root, const Eigen::VectorXd& q, bool acting);
   void show_person(int tick);
   void take_state();
@@ -86,6 +89,7 @@ class GuardedWorld final : public World {
   PersonMessage person_;
   Eigen::VectorXd target_;
   int tick_ = 0;
+  double stand_off_ = 0.0;  // by which the person is further away than the clip has them [m]
   SafetyState last_state_ = SafetyState::kOffline;
   ClampCounts clamps_before_{}, clamps_{};
   int held_ticks_ = 0, missed_ = 0;

@@ -18,6 +18,10 @@ constexpr double kWeightRate = 0.2;  // of the maker's example [1/s]
 constexpr int kArmsFrom = 15, kWeightMotor = 29;
 constexpr int kMostResponses = 16;  // of a tick
 
+bool moves(SafetyState state) {
+  return state == SafetyState::kStand || state == SafetyState::kRun || state == SafetyState::kHold;
+}
+
 bool stands_still(const VelocityCommand& v) { return v.forward == 0.0 && v.lateral == 0.0 && v.yaw_rate == 0.0; }
 
 }  // namespace
@@ -95,7 +99,7 @@ bool SportExecutor::write(const LowCommandFrame& frame) {
 // Sends at once where it comes to rest, otherwise ten times a second: each order lasts a little longer than that.
 void SportExecutor::send(const VelocityCommand& velocity) {
   ++ticks_;
-  if (!open_ || state_ == SafetyState::kArmed || state_ >= SafetyState::kDamp) return;
+  if (!open_ || !moves(state_)) return;
   const bool comes_to_rest = stands_still(velocity) && !stands_still(sent_);
   if (!comes_to_rest && !every(kVelocityPeriod)) return;
   sent_ = velocity;

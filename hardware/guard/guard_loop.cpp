@@ -65,6 +65,19 @@ void take_readings(RobotWire& wire, RobotGuard& guard, double now) {
   if (const double heard = wire.executor_heard(now); heard != kNever) guard.executor_heard(heard);
 }
 
+void run_or_damp(RobotGuard& guard, const std::function<void()>& run,
+                 const std::function<void(const std::exception&)>& damp) {
+  try {
+    run();
+  } catch (const std::exception& error) {
+    if (guard.status().order.writes) {
+      guard.stop();
+      damp(error);
+    }
+    throw;
+  }
+}
+
 void LcmVelocity::send(const VelocityCommand& velocity) {
   if (calls_++ % kVelocityEvery != 0) return;
   LcmBuffer buffer;
@@ -79,8 +92,9 @@ void run_guard(RobotGuard& guard, RobotWire& wire, DatagramSocket* planner, doub
   double now = next;
   do {
     next += period;
-    // After a pause it does not catch up: the state machine has to see how late it is, once.
-    if (next < monotonic_seconds() - period) next = monotonic_seconds();
+    // After a pause it does not catch up: the state machine has to see how late it is, once; and what came meanwhile
+    // has a period to get here, before its age is told.
+    if (next < monotonic_seconds() - period) next = monotonic_seconds() + period;
     sleep_until(next);
     if (planner != nullptr) take_messages(*planner, guard, message, monotonic_seconds());
     take_readings(wire, guard, monotonic_seconds());

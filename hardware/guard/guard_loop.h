@@ -2,6 +2,7 @@
 // the wire, and ticks. One thread.
 #pragma once
 
+#include <exception>
 #include <functional>
 #include <memory>
 #include <string>
@@ -43,6 +44,11 @@ void take_readings(RobotWire& wire, RobotGuard& guard, double now);
 // Runs until `go_on`, called after each tick, is false. `planner` may be null. `period` of ticks [s].
 void run_guard(RobotGuard& guard, RobotWire& wire, DatagramSocket* planner, double period,
                const std::function<bool(double now)>& go_on);
+
+// Calls `run`; where it throws while the robot is commanded, `damp` has to go on ticking the guard, which has been told
+// to stop, until its operator ends that. Then the exception goes on.
+void run_or_damp(RobotGuard& guard, const std::function<void()>& run,
+                 const std::function<void(const std::exception&)>& damp);
 
 // A planner's way to the guard and back, be it in another process or in this one. One owner, one thread.
 

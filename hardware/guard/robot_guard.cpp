@@ -16,6 +16,7 @@ constexpr double kWritersPeriod = 0.1;
 // Angle from the stance at which the robot counts as standing [rad].
 constexpr double kStanding = 0.05;
 constexpr double kWalkerPeriod = 0.02;  // [s]
+constexpr long kTicksToNewWriter = 50;
 // Faster than anybody moves a joint of theirs: a jump of the estimate [m/s].
 constexpr double kPersonJump = 10.0;
 // A joint's measured angle may be beyond its limit by this: play and zero error [rad].
@@ -128,6 +129,7 @@ void RobotGuard::tick(double now) {
   read_operator(now);
   check_robot();
   next_.arm = armed_;
+  next_.written_at = now - setup_.limiter.dt * static_cast<double>(unsent_);  // a pause of ours is none of the writer
   safety_ = next_safety(setup_.rules, safety_, next_);
   armed_ = false;
   status_.order = safety_order(setup_.rules, safety_, next_);
@@ -191,26 +193,25 @@ void RobotGuard::check_robot() {
     ticks_to_writers_ = static_cast<int>(kWritersPeriod / setup_.limiter.dt);
     next_.foreign_writer = transport_.foreign_writers() > 0;
   }
-  next_.hands_clear = hands_are_clear();
 }
 
-bool RobotGuard::hands_are_clear() const {
-  if (!setup_.limiter.person || next_.person_at == kNever) return true;
-  const BodyGaps& gaps = limiter_.gaps();
-  const double nearest = std::min(gaps.touch, gaps.person + setup_.limiter.limits.pose_uncertainty);
-  return nearest > setup_.limiter.limits.reserve;
-}
-
-// Every joint to its stance, from where it was measured when the robot was told to stand.
+// Every joint to its stance, from where it was measured when the robot was told to stand, as fast as the distance to a
+// person allows. It stands once all are there and none would stop faster than it may.
 void RobotGuard::follow_stance() {
-  if (safety_.since == next_.now)
+  if (!follows_stance_)
     for (int j = 0; j < kG1Motors; ++j) stance_[j] = {reading_.state.q[j], 0.0};
+  follows_stance_ = true;
   AxisClamps clamps;
   next_.stands = true;
   for (int j = 0; j < kG1Motors; ++j) {
     const double target = setup_.stance.q_target[j];
-    stance_[j] = follow(target, stance_[j], stance_bounds(limiter_, j), setup_.limiter.dt, clamps);
-    next_.stands = next_.stands && std::abs(stance_[j].value - target) < kStanding;
+    AxisBounds bounds = stance_bounds(limiter_, j);
+    const double stop = bounds.rate_change * setup_.limiter.dt;
+    bounds.rate *= limiter_.share();
+    bounds.stop_rate = bounds.rate;
+    stance_[j] = follow(target, stance_[j], bounds, setup_.limiter.dt, clamps);
+    const bool there = std::abs(stance_[j].value - target) < kStanding && std::abs(stance_[j].rate) <= stop;
+    next_.stands = next_.stands && there;
     joints_.q_target[j] = stance_[j].value;
   }
   joints_.kp = setup_.stance.kp;
@@ -231,16 +232,19 @@ void RobotGuard::command(double now) {
   const bool person = level_of(now - next_.person_at, setup_.rules.person) < StopLevel::kHold;
   input_.person = person ? &person_.joints : nullptr;
   input_.person_speed = person_speed_;
-  input_.acting = planner_.acting;
+  const bool holds = safety_.state == SafetyState::kHold;
+  const bool planned = safety_.state == SafetyState::kRun || (holds && next_.stands);
+  input_.acting = planned && planner_.acting;
   input_.share = status_.order.share;
-  const bool planned = safety_.state == SafetyState::kRun || safety_.state == SafetyState::kHold;
-  input_.release = planned && (status_.order.opens || status_.contact.release);
-  if (status_.order.stands) follow_stance();
+  input_.release = planned && status_.contact.release;
   restart_limiter(planned);
   status_.received = planner_is_new_;
   const MotionCommand* received = planner_is_new_ ? &planner_.command : nullptr;
   limiter_.tick(received, input_, limiter_state_, status_.limited, status_.clamps);
   planner_is_new_ = false;
+  status_.share = limiter_.share();
+  if (status_.order.damps || !status_.order.writes) follows_stance_ = next_.stands = false;
+  if (status_.order.stands || (holds && !planned)) follow_stance();
   walk(planned);
   if (!planned) return;
   for (const int joint : setup_.limiter.executed.joints) {
@@ -250,7 +254,7 @@ void RobotGuard::command(double now) {
   }
 }
 
-// Runs from when it stands until it is damped, 50 times a second; the velocity has passed the limiter.
+// Runs from when it stands until it is damped, a hold included, 50 times a second; the velocity has passed the limiter.
 void RobotGuard::walk(bool planned) {
   const bool was_walking = walks_;
   walks_ = walker_ != nullptr && (planned || (status_.order.stands && next_.stands));
@@ -291,6 +295,7 @@ void RobotGuard::send() {
   velocity_.enter(safety_.state);
   const SafetyOrder& order = status_.order;
   if (!order.writes || setup_.dry_run) {
+    unsent_ = 0;
     if (transport_.has_writer()) transport_.close_writer();
     return;
   }
@@ -301,7 +306,14 @@ void RobotGuard::send() {
   else
     build_command(joints_, machine, status_.frame);
   status_.sent = transport_.write(status_.frame);
+  keep_writer();
   velocity_.send(was_planned_ ? status_.limited.root : VelocityCommand{0.0, 0.0, 0.0, setup_.limiter.limits.height});
+}
+
+// A writer that is lost is made anew now and then: nothing else commands the robot.
+void RobotGuard::keep_writer() {
+  unsent_ = status_.sent ? 0 : unsent_ + 1;
+  if (unsent_ > 0 && unsent_ % kTicksToNewWriter == 0) transport_.close_writer();
 }
 
 }  // namespace duet

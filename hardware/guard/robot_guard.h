@@ -60,6 +60,7 @@ struct GuardStatus {
   Eigen::VectorXd restart_q;
   bool took_state = false;  // a state came in this tick, whole or not
   LowStateFrame state_frame{};
+  double share = 0.0;       // of all speeds, after the distance to a person
   bool sent = false;        // a frame left in this tick
   LowCommandFrame frame{};  // it
 };
@@ -111,7 +112,7 @@ class RobotGuard {
   void keep_walking();
   void restart_limiter(bool planned);
   void send();
-  [[nodiscard]] bool hands_are_clear() const;
+  void keep_writer();
 
   GuardSetup setup_;
   FrameTransport& transport_;
@@ -138,8 +139,9 @@ class RobotGuard {
   int ticks_to_writers_ = 0;
   Walker* walker_ = nullptr;
   const JointCommand* walker_joints_ = nullptr;
-  bool walks_ = false;
+  bool walks_ = false, follows_stance_ = false;
   int ticks_to_step_ = 0;
+  long unsent_ = 0;  // ticks since a frame last left
   GuardStatus status_;
 };
 

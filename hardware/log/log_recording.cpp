@@ -154,9 +154,7 @@ PointTracks people_of(const std::vector<LoggedTick>& ticks, int frames) {
 }
 
 void set_end(const LogReader& log, Recording& recording) {
-  if (recording.outcome != Outcome::kOk || log.end_cause.empty() || log.end_cause == "stop_key" ||
-      log.end_cause == "held_too_long")
-    return;
+  if (recording.outcome != Outcome::kOk || log.end_cause.empty() || log.end_cause == "stop_key") return;
   recording.outcome = Outcome::kError;
   recording.message = fmt::format("the guard ended the run: {}", log.end_cause);
 }

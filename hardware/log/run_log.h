@@ -112,7 +112,7 @@ struct LoggedRun {
 
 // The ticks of a log in which the guard ran or held for a planner with a goal; where none had one, all in which it ran
 // or held: the reference's root is then the measured one. The outcome is `fell` where the robot fell (the recording
-// ends there), `error` where the guard ended the run for another reason than its operator or planner, and else `ok`.
+// ends there), `error` where the guard ended the run for another reason than its operator, and else `ok`.
 // Throws InputError for a file that is no such log, made for another robot, or without such ticks.
 LoggedRun recording_of_log(const std::string& path, std::optional<Task> task = {});
 

@@ -148,6 +148,7 @@ void Limiter::open_arms(const LimiterInput& input, ClampCounts& counts) {
   for (const int joint : setup_.executed.joints)
     arms_are_open = arms_are_open && std::abs(input.state.q[joint] - open[joint]) < kOpen;
   wanted_.root.forward = arms_are_open ? -setup_.limits.step_back : 0.0;
+  if (!(input.share > 0.0)) wanted_.root.forward = 0.0;
   wanted_.root.lateral = 0.0;
   wanted_.root.yaw_rate = 0.0;
   count(counts, ClampReason::kRelease);

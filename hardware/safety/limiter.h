@@ -103,7 +103,7 @@ struct LimiterInput {
   double person_speed = 0.0;            // measured [m/s]; HardwareLimits::human_speed is the least that is assumed
   bool acting = false;                  // the task's act lasts: `touches` may touch
   double share = 0.0;                   // of all speeds that the state machine allows, 0 to 1
-  bool release = false;                 // open the arms, then step back
+  bool release = false;                 // open the arms, then step back; with a share of 0 the root stays at rest
 };
 
 // The state of the outputs so far.
@@ -142,6 +142,8 @@ class Limiter {
 
   // Distances of the arms at rest after the last tick, in the last tick's pose of the root.
   [[nodiscard]] const BodyGaps& gaps() const { return distance_.gaps(); }
+  // The share of all speeds in the last tick, after the distance to a person.
+  [[nodiscard]] double share() const { return wanted_.share; }
   [[nodiscard]] const LimiterSetup& setup() const { return setup_; }
   [[nodiscard]] bool executes(int joint) const { return executed_[joint]; }
   [[nodiscard]] const AxisBounds& joint_bounds(int joint) const { return joint_bounds_[joint]; }

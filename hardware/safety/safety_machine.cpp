@@ -13,6 +13,8 @@ void enter(SafetyState state, StopCause cause, double now, SafetyMemory& memory)
   memory.state = state;
   memory.cause = cause;
   memory.since = now;
+  memory.commands = memory.commands || state == SafetyState::kArmed;
+  memory.let_go = false;
 }
 
 void listen(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
@@ -54,26 +56,25 @@ void stand(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& mem
   if (input.run && input.stands && well) enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
 }
 
-// Whether a hold may still end in running.
+// Whether a hold ends without anybody asking: nothing but the planner was late, and not for long.
 bool may_return(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input) {
-  return memory.cause == StopCause::kPlannerAge && input.now - memory.since <= rules.hold_time &&
-         level_of(input.now - input.planner_at, rules.planner) < StopLevel::kDamp;
+  return memory.cause == StopCause::kPlannerAge && input.now - memory.since <= rules.hold_time;
 }
 
-// Back to running only where nothing but the planner was late, and not for long. Everything else ends in damping, once
-// the hands are off the person.
+// Lasts until all is well again and the operator asks for what it held: to run, or, before it stood, to stand.
 void hold(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
   const Assessment found = assess(rules, input, memory.bad, memory.last_now, true);
-  if (found.level == StopLevel::kDamp && found.cause != StopCause::kPlannerAge)
-    return enter(SafetyState::kDamp, found.cause, input.now, memory);
-  if (found.level >= StopLevel::kHold && found.cause != StopCause::kPlannerAge) memory.cause = found.cause;
-  if (may_return(rules, memory, input)) {
-    if (found.level < StopLevel::kHold) enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
+  if (found.level == StopLevel::kDamp) return enter(SafetyState::kDamp, found.cause, input.now, memory);
+  if (found.level == StopLevel::kHold && found.cause != StopCause::kPlannerAge) memory.cause = found.cause;
+  memory.let_go = memory.let_go || !input.run;
+  if (!input.stands) {
+    const bool well = assess(rules, input, memory.bad, memory.last_now, false).level < StopLevel::kHold;
+    if (well && input.stand) enter(SafetyState::kStand, StopCause::kNone, input.now, memory);
     return;
   }
-  if (!input.hands_clear) return;
-  const bool late_planner = memory.cause == StopCause::kPlannerAge;
-  enter(SafetyState::kDamp, late_planner ? StopCause::kHeldTooLong : memory.cause, input.now, memory);
+  const bool asked = memory.let_go && input.run;
+  if (found.level < StopLevel::kHold && (asked || may_return(rules, memory, input)))
+    enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
 }
 
 // A stop that the operator asked for, or an arming that lapsed, may be followed by another arming; nothing else.
@@ -94,6 +95,10 @@ std::string_view safety_state_name(SafetyState state) { return kStateNames[stati
 std::string_view missing_for_arming(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input) {
   const Assessment found = assess(rules, input, memory.bad, memory.last_now, false);
   if (found.level >= StopLevel::kHold) return stop_cause_name(found.cause);
+  const RobotHealth& health = input.health;
+  if (health.charge < rules.warn_charge) return stop_cause_name(StopCause::kCharge);
+  if (health.casing > rules.warn_casing || health.winding > rules.warn_winding)
+    return stop_cause_name(StopCause::kTemperature);
   if (!input.health.joints_in_range) return "joints_in_range";
   return "";
 }
@@ -133,28 +138,28 @@ SafetyMemory next_safety(const SafetyRules& rules, const SafetyMemory& before, c
 
 SafetyOrder safety_order(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input) {
   SafetyOrder order;
-  order.writes = memory.state >= SafetyState::kArmed;
-  order.damps =
-      memory.state == SafetyState::kArmed || memory.state == SafetyState::kDamp || memory.state == SafetyState::kFault;
+  const bool moves = memory.state == SafetyState::kRun || memory.state == SafetyState::kHold;
+  order.writes = memory.commands;
   order.stands = memory.state == SafetyState::kStand;
+  order.damps = order.writes && !order.stands && !moves;
   if (memory.state == SafetyState::kRun) order.share = planner_share(rules, input.now - input.planner_at);
-  order.opens = memory.state == SafetyState::kHold && !may_return(rules, memory, input);
+  if (order.stands && stand_waits_for(rules, input) == StopCause::kNone) order.share = 1.0;
   return order;
+}
+
+StopCause stand_waits_for(const SafetyRules& rules, const SafetyInput& input) {
+  if (level_of(input.now - input.dead_man_at, rules.remote) >= StopLevel::kHold) return StopCause::kDeadMan;
+  const bool seen = level_of(input.now - input.person_at, rules.person) < StopLevel::kHold;
+  return rules.person_present && !seen ? StopCause::kPersonAge : StopCause::kNone;
 }
 
 namespace {
 
 constexpr std::array<std::string_view, kStopCauses> kCauseNames = {
-    "none",           "state_age",  "bad_states",  "planner_age",   "person_age",  "odometry_age",
-    "odometry_jump",  "remote_age", "dead_man",    "loop_late",     "clock",       "tilt",
-    "joint_speed",    "gyro",       "temperature", "charge",        "motor_error", "mode",
-    "foreign_writer", "stop_key",   "lapsed",      "held_too_long", "executor_age"};
-
-StopLevel above(double value, double hold, double damp) {
-  // Written so that a value that is not a number is the worst.
-  if (!(value <= damp)) return StopLevel::kDamp;
-  return value > hold ? StopLevel::kHold : StopLevel::kFine;
-}
+    "none",           "state_age",  "bad_states",  "planner_age", "person_age",  "odometry_age",
+    "odometry_jump",  "remote_age", "dead_man",    "loop_late",   "clock",       "tilt",
+    "joint_speed",    "gyro",       "temperature", "charge",      "motor_error", "mode",
+    "foreign_writer", "stop_key",   "lapsed",      "lost_writer", "executor_age"};
 
 StopLevel damp_if(bool wrong) { return wrong ? StopLevel::kDamp : StopLevel::kFine; }
 StopLevel hold_if(bool wrong) { return wrong ? StopLevel::kHold : StopLevel::kFine; }
@@ -168,14 +173,14 @@ int since(const BadStates& bad, double from) {
 }
 
 StopLevel level_of_bad_states(const SafetyRules& rules, const BadStates& bad, double now) {
-  if (since(bad, now - rules.damp_bad_time) >= rules.damp_bad_states) return StopLevel::kDamp;
-  if (since(bad, now - rules.hold_bad_time) >= rules.hold_bad_states) return StopLevel::kHold;
-  return since(bad, now - rules.damp_bad_time) > 0 ? StopLevel::kWarn : StopLevel::kFine;
+  const int count = since(bad, now - rules.hold_bad_time);
+  if (count >= rules.hold_bad_states) return StopLevel::kHold;
+  return count > 0 ? StopLevel::kWarn : StopLevel::kFine;
 }
 
 void assess_clock(const SafetyRules& rules, const SafetyInput& input, double last_now, Assessment& all) {
   if (last_now == kNever) return;
-  worsen(all, damp_if(!(input.now >= last_now)), StopCause::kClock);
+  worsen(all, hold_if(!(input.now >= last_now)), StopCause::kClock);
   worsen(all, level_of(input.now - last_now - input.period, rules.loop), StopCause::kLoopLate);
 }
 
@@ -183,14 +188,15 @@ void assess_robot(const SafetyRules& rules, const SafetyInput& input, const BadS
   const RobotHealth& health = input.health;
   worsen(all, level_of(input.now - input.state_at, rules.state), StopCause::kStateAge);
   worsen(all, level_of_bad_states(rules, bad, input.now), StopCause::kBadStates);
-  worsen(all, above(health.tilt, rules.hold_tilt, rules.damp_tilt), StopCause::kTilt);
-  worsen(all, damp_if(!(health.joint_speed <= rules.joint_speed)), StopCause::kJointSpeed);
-  worsen(all, damp_if(!(health.gyro <= rules.gyro)), StopCause::kGyro);
-  worsen(all, above(health.casing, rules.hold_casing, rules.damp_casing), StopCause::kTemperature);
-  worsen(all, above(health.winding, rules.hold_winding, rules.damp_winding), StopCause::kTemperature);
-  worsen(all, hold_if(!(health.charge >= rules.charge)), StopCause::kCharge);
+  worsen(all, level_of(health.tilt, {kNoLimit, rules.hold_tilt, rules.damp_tilt}), StopCause::kTilt);
+  worsen(all, hold_if(!(health.joint_speed <= rules.joint_speed)), StopCause::kJointSpeed);
+  worsen(all, hold_if(!(health.gyro <= rules.gyro)), StopCause::kGyro);
+  worsen(all, level_of(health.casing, {rules.warn_casing, rules.hold_casing}), StopCause::kTemperature);
+  worsen(all, level_of(health.winding, {rules.warn_winding, rules.hold_winding}), StopCause::kTemperature);
+  worsen(all, level_of(-health.charge, {-rules.warn_charge, -rules.hold_charge}), StopCause::kCharge);
   worsen(all, damp_if(health.motor_error), StopCause::kMotorError);
-  worsen(all, damp_if(!health.mode_is_expected), StopCause::kMode);
+  worsen(all, hold_if(!health.mode_is_expected), StopCause::kMode);
+  worsen(all, level_of(input.now - input.written_at, rules.writer), StopCause::kLostWriter);
 }
 
 void assess_motion(const SafetyRules& rules, const SafetyInput& input, Assessment& all) {
@@ -215,9 +221,10 @@ void note_bad_states(int count, double now, BadStates& bad) {
   }
 }
 
+// Written so that a value that is not a number is the worst.
 StopLevel level_of(double age, const AgeLimits& limits) {
-  if (!(age <= limits.damp)) return StopLevel::kDamp;
-  if (age > limits.hold) return StopLevel::kHold;
+  if (limits.damp < kNoLimit && !(age <= limits.damp)) return StopLevel::kDamp;
+  if (!(age <= limits.hold)) return StopLevel::kHold;
   return age > limits.warn ? StopLevel::kWarn : StopLevel::kFine;
 }
 

@@ -36,7 +36,7 @@ enum class StopCause {
   kForeignWriter,  // somebody else commands the robot
   kStopKey,
   kLapsed,       // armed for too long without anything to do
-  kHeldTooLong,  // a planner that stayed away, after a hold
+  kLostWriter,   // what is written does not leave any more
   kExecutorAge,  // nothing from who executes the commands
 };
 inline constexpr std::size_t kStopCauses = 23;
@@ -44,36 +44,42 @@ std::string_view stop_cause_name(StopCause cause);  // "state_age", ...
 
 inline constexpr double kNever = -std::numeric_limits<double>::infinity();
 
+inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
 // An age at which a level begins [s]; a level that a signal does not have begins never.
 struct AgeLimits {
-  double warn, hold, damp = std::numeric_limits<double>::infinity();
+  double warn, hold, damp = kNoLimit;
 };
 
-// The defaults are those of docs/hardware.md, "Timeouts"; a configuration cannot change them.
+// The defaults are those of docs/hardware.md, "Timeouts"; a configuration cannot change them. A biped that is damped
+// falls: only the stop key, a robot that falls already, a motor error, a robot that is not heard and a writer that is
+// lost damp. Everything else holds, and a hold stands.
 struct SafetyRules {
   AgeLimits state{0.006, 0.020, 0.100};
-  AgeLimits planner{0.25, 0.6, 2.0};
+  AgeLimits planner{0.25, 0.6};
   AgeLimits person{0.1, 0.25};
   AgeLimits odometry{0.05, 0.15};
-  AgeLimits remote{0.1, 0.2, 3.0};
-  AgeLimits executor{0.3, 0.6};                         // read where `executor_answers`
-  AgeLimits loop{0.005, 0.040, 0.100};                  // by which a tick comes late
-  int hold_bad_states = 3, damp_bad_states = 10;        // within
-  double hold_bad_time = 0.050, damp_bad_time = 0.100;  // [s]
-  double odometry_jump = 0.1;                           // [m]
-  double hold_tilt = 0.5, damp_tilt = 1.0;              // [rad]
-  double joint_speed = 10.0, gyro = 6.0;                // [rad/s]
-  double hold_casing = 75.0, damp_casing = 85.0;        // [degrees C]
-  double hold_winding = 100.0, damp_winding = 120.0;
-  double charge = 20.0;           // [%]
-  double late_share = 0.5;        // of speeds when the planner begins to be late; 0 at its hold
-  double ready_time = 2.0;        // for which everything has to be well before arming [s]
-  double armed_time = 60.0;       // idle, until it lapses [s]
-  double hold_time = 2.0;         // in which a late planner may come back [s]
-  double damp_time = 5.0;         // [s]
-  bool person_present = true;     // a person's pose is needed
-  bool walks = true;              // odometry is needed
-  bool executor_answers = false;  // who executes the commands is heard of, and has to be
+  AgeLimits remote{0.1, 0.2};
+  AgeLimits executor{0.3, 0.6};              // read where `executor_answers`
+  AgeLimits loop{0.005, 0.040};              // by which a tick comes late
+  AgeLimits writer{0.006, kNoLimit, 0.100};  // since a frame last left
+  int hold_bad_states = 3;                   // within
+  double hold_bad_time = 0.050;              // [s]
+  double odometry_jump = 0.1;                // [m]
+  double hold_tilt = 0.5, damp_tilt = 1.0;   // [rad]
+  double joint_speed = 10.0, gyro = 6.0;     // [rad/s]
+  // A warning is no reason to stop, but keeps it from being armed.
+  double warn_casing = 75.0, hold_casing = 85.0;  // [degrees C]
+  double warn_winding = 100.0, hold_winding = 120.0;
+  double warn_charge = 30.0, hold_charge = 20.0;  // [%]
+  double late_share = 0.5;                        // of speeds when the planner begins to be late; 0 at its hold
+  double ready_time = 2.0;                        // for which everything has to be well before arming [s]
+  double armed_time = 60.0;                       // idle, until it lapses [s]
+  double hold_time = 2.0;                         // in which a late planner may end a hold by coming back [s]
+  double damp_time = 5.0;                         // [s]
+  bool person_present = true;                     // a person's pose is needed
+  bool walks = true;                              // odometry is needed
+  bool executor_answers = false;                  // who executes the commands is heard of, and has to be
 };
 
 // The robot's report on itself.
@@ -96,15 +102,15 @@ struct SafetyInput {
   int bad_states = 0;        // since the last tick
   double planner_at = kNever, person_at = kNever, odometry_at = kNever, remote_at = kNever;
   double executor_at = kNever;
-  double odometry_step = 0.0;   // largest between two samples since the last tick [m]
-  double dead_man_at = kNever;  // last time that the operator was seen to hold it
+  double written_at = kNoLimit;  // when a frame last left, by ticks in which one should have; kNoLimit: none has to
+  double odometry_step = 0.0;    // largest between two samples since the last tick [m]
+  double dead_man_at = kNever;   // last time that the operator was seen to hold it
   RobotHealth health;
   bool foreign_writer = false;
   bool stop_key = false;
-  bool hands_clear = true;             // no hand is nearer to a person than the distance at which it may move
   bool arm = false;                    // the operator has armed (hardware/executors/executor.h); never set in a dry run
   bool stand = false, stands = false;  // asked to stand up; has stood up
-  bool run = false;                    // asked to run
+  bool run = false;                    // asked to run, or to run again after a hold
 };
 
 // Times of the last bad states, the newest first.
@@ -139,9 +145,9 @@ enum class SafetyState {
   kListen,   // it is heard; something is missing before arming
   kReady,    // everything has been well for SafetyRules::ready_time
   kArmed,    // the operator has armed: joints are damped
-  kStand,    // goes to its stance, and stands there
+  kStand,    // goes to its stance while the dead-man switch is held and nobody is near, and stands there
   kRun,      // follows the planner
-  kHold,     // root at rest, arms frozen, gains as they were
+  kHold,     // stands: root at rest, arms frozen, gains as they were; without end
   kDamp,     // joints are damped, for SafetyRules::damp_time
   kFault,    // damped until this program is started anew
 };
@@ -155,6 +161,8 @@ struct SafetyMemory {
   double well_since = kNever;          // from when everything that arming needs has been well; kNever: it is not
   double last_now = kNever;            // of the tick before
   std::string_view missing = {};       // why it was last not ready, while it listens
+  bool commands = false;               // it has been armed: from then on the robot is never without commands
+  bool let_go = false;                 // since the hold began nobody has asked to run
   BadStates bad;
 };
 
@@ -163,14 +171,16 @@ struct SafetyOrder {
   bool writes = false;  // something is sent to the robot
   bool damps = false;   // and it is damping
   bool stands = false;  // or going to, and keeping, the stance
-  double share = 0.0;   // of all speeds of planned motion
-  bool opens = false;   // the arms open: a hold that will end in damping
+  double share = 0.0;   // of all speeds: of planned motion, or of the way to the stance
 };
 
 // One tick. `input.now` does not fall; where it does, the machine damps.
 SafetyMemory next_safety(const SafetyRules& rules, const SafetyMemory& before, const SafetyInput& input);
 
 SafetyOrder safety_order(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input);
+
+// What keeps a robot that is in kStand from moving on to its stance; kNone where nothing does.
+StopCause stand_waits_for(const SafetyRules& rules, const SafetyInput& input);
 
 // The condition that is missing for arming; empty where none is.
 std::string_view missing_for_arming(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input);

@@ -123,15 +123,16 @@ bool TwinInProcess::Wire::take(LowStateFrame& frame) {
 }
 
 bool TwinInProcess::Wire::write(const LowCommandFrame& frame) {
-  if (open_) twin_.obey(frame);
-  return open_;
+  const bool leaves = open_ && trouble_.writes;
+  if (leaves) twin_.obey(frame);
+  return leaves;
 }
 
 TwinInProcess::TwinInProcess(const GuardSetup& setup, const TwinOptions& options, std::unique_ptr<Walker> walker,
                              RunLog* log, std::vector<TwinFault> faults)
     : twin_(setup.limiter.robot, options),
       faulty_(twin_, std::move(faults), options.seed),
-      wire_(twin_),
+      wire_(twin_, trouble),
       velocity_(twin_),
       guard_(setup, wire_, velocity_),
       walker_(std::move(walker)),
@@ -154,15 +155,24 @@ bool TwinInProcess::stop() {
   return true;
 }
 
-void TwinInProcess::tick() {
+void TwinInProcess::step_twin() {
   operator_.tick(twin_.time(), twin_);
   twin_.step(kTwinPeriod);
   LowStateFrame frame;
   if (faulty_.next_state(twin_.time(), frame)) wire_.states.push_back(frame);
+}
+
+void TwinInProcess::pause(double seconds) {
+  for (double left = seconds; left > 0.5 * kTwinPeriod; left -= kTwinPeriod) step_twin();
+}
+
+void TwinInProcess::tick() {
+  step_twin();
   OdometrySample odometry = twin_.odometry(twin_.time());
+  odometry.X_WB.p.x() += trouble.jump;
   odometry.X_WB.p = as_sent(odometry.X_WB.p);
   odometry.v_WB = as_sent(odometry.v_WB);
-  guard_.receive(odometry);
+  if (trouble.odometry) guard_.receive(odometry);
   guard_.receive(BatteryReading{.charge = twin_.condition.charge}, twin_.time());
   if (guard_.status().safety.state == SafetyState::kReady) guard_.arm();
   guard_.tick(twin_.time());

@@ -65,6 +65,14 @@ class LockStepTwin {
   bool locked_ = false;
 };
 
+// Troubles between guard and twin that are none of the twin's states (TwinFault).
+struct TwinTrouble {
+  int foreign_writers = 0;
+  bool odometry = true;  // is heard
+  double jump = 0.0;     // of odometry, along x [m]
+  bool writes = true;    // commands leave
+};
+
 // A guard, a twin and its operator in this process, one tick after the other: what two processes are over DDS, without
 // the wire. The same seed gives the same bits. One owner, one thread.
 class TwinInProcess final : public GuardLink {
@@ -80,16 +88,21 @@ class TwinInProcess final : public GuardLink {
   [[nodiscard]] double patience() const override { return 0.0; }
   [[nodiscard]] std::string name() const override { return "the guard of the twin"; }
 
+  // The twin goes on, and nobody ticks the guard.
+  void pause(double seconds);
+
   [[nodiscard]] const RobotGuard& guard() const { return guard_; }
   [[nodiscard]] TwinModel& twin() { return twin_; }
+  [[nodiscard]] TwinOperator& operated() { return operator_; }
+  TwinTrouble trouble;
 
  private:
   // The transport between guard and twin.
   class Wire final : public FrameTransport {
    public:
-    explicit Wire(TwinModel& twin) : twin_(twin) {}
+    Wire(TwinModel& twin, const TwinTrouble& trouble) : twin_(twin), trouble_(trouble) {}
     bool take(LowStateFrame& frame) override;
-    int foreign_writers() override { return 0; }
+    int foreign_writers() override { return trouble_.foreign_writers; }
     void open_writer() override { open_ = true; }
     void close_writer() override { open_ = false; }
     [[nodiscard]] bool has_writer() const override { return open_; }
@@ -98,6 +111,7 @@ class TwinInProcess final : public GuardLink {
 
    private:
     TwinModel& twin_;
+    const TwinTrouble& trouble_;
     bool open_ = false;
   };
   class Velocity final : public VelocitySink {
@@ -109,6 +123,7 @@ class TwinInProcess final : public GuardLink {
     TwinModel& twin_;
   };
   void tick();
+  void step_twin();
 
   TwinModel twin_;
   FaultyTwin faulty_;

@@ -33,6 +33,18 @@ bool is_sane(const LowCommandFrame& frame) {
 
 }  // namespace
 
+TwinOptions usual_noise(double share) {
+  TwinOptions twin;
+  twin.place_noise = share * 0.002;
+  twin.speed_noise = share * 0.02;
+  twin.joint_noise = share * 0.002;
+  twin.joint_speed_noise = share * 0.1;
+  twin.gyro_noise = share * 0.05;
+  twin.acceleration_noise = share * 0.1;
+  twin.tilt_noise = share * 0.01;
+  return twin;
+}
+
 TwinModel::TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions& options)
     : robot_(std::move(robot)), options_(options), random_(options.seed, stream_key({"twin"})) {
   require(robot_ != nullptr && robot_->dof() == kG1Motors, "twin: expected a robot of {} joints, found another",

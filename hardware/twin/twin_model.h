@@ -72,6 +72,9 @@ struct TwinOptions {
       {};  // of backends/ that simulates its body; empty: the first-order one. Steps are then kTwinPeriod
 };
 
+// Options with the noise of a robot of this kind, as far as published training noise and data sheets go; `share` of it.
+TwinOptions usual_noise(double share);
+
 inline constexpr double kTwinPeriod = 0.002;  // of states and of an engine's steps [s]
 
 // Conditions that a script may change.

@@ -45,15 +45,13 @@ void TwinOperator::look(double time, const TwinModel& twin) {
       if (target != targets_[joint]) still_since_ = time;
       targets_[joint] = target;
     }
-  if (!held)
-    let_down_at_ = kNever;
-  else if (let_down_at_ == kNever && time - held_since_ > kHungFor && time - still_since_ > kStillFor)
+  if (held && let_down_at_ == kNever && time - held_since_ > kHungFor && time - still_since_ > kStillFor)
     let_down_at_ = time;
 }
 
 void TwinOperator::press(double time, TwinModel& twin) {
   const bool press_start = !stood_ && time - damped_since_ > kDampedFor;
-  const bool stands = let_down_at_ != kNever && time - let_down_at_ > kLetDownFor + kStoodFor;
+  const bool stands = asks_ && let_down_at_ != kNever && time - let_down_at_ > kLetDownFor + kStoodFor;
   if (press_start || (stands && time >= next_press_)) {
     pressed_ = press_start ? RemoteKey::kStart : RemoteKey::kA;
     pressed_until_ = time + kPressed;

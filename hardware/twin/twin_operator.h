@@ -1,6 +1,6 @@
 // The operator of a demonstration: holds the dead-man switch, stands the twin up once it is damped, lets it down from
-// its rope once its motors hold it and its arms have come to rest, and asks it to run, again and again, until it does.
-// A limp or damped robot goes back on the rope. One owner, one thread.
+// its rope once its motors hold it and its arms have come to rest, and asks it to run, again and again, also after a
+// hold. A robot that was let down once stays down: damped or limp, it falls. One owner, one thread.
 #pragma once
 
 #include <array>
@@ -17,6 +17,8 @@ class TwinOperator {
  public:
   // Before each step of the twin; `time` is the twin's [s].
   void tick(double time, TwinModel& twin);
+  // Whether it asks to run; where it does not, a hold lasts.
+  void asks(bool asks) { asks_ = asks; }
 
  private:
   void look(double time, const TwinModel& twin);
@@ -26,7 +28,7 @@ class TwinOperator {
   double pressed_until_ = 0.0, next_press_ = 0.0;
   std::array<float, kG1Motors> targets_{};
   RemoteKey pressed_ = RemoteKey::kStart;
-  bool stood_ = false;
+  bool stood_ = false, asks_ = true;
 };
 
 // Faults of a twin by script: what goes wrong, from when to when. One owner, one thread; randomness by a seed.

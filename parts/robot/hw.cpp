@@ -27,7 +27,8 @@ constexpr double kPlanPeriod = 0.02;  // [s]
 constexpr double kSaidEvery = 3.0;    // what is missing [s]
 constexpr const char* kNotSafetyRated =
     "This software is not safety-rated. It replaces neither gantry nor emergency stop nor spotter.";
-volatile std::sig_atomic_t asked_to_end = 0;
+constexpr const char* kTwice = "it is damped until Ctrl-C twice: a robot whose commands end does what is not known";
+volatile std::sig_atomic_t asked_to_end = 0;  // how often
 
 struct HardwareArguments {
   std::string config, socket = "duet-guard.socket", log, command = "0,0,0", person_socket = "duet-person.socket",
@@ -42,7 +43,7 @@ struct HardwareArguments {
 // finish.
 void end_on_signals() {
   asked_to_end = 0;
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { asked_to_end = 1; });
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { asked_to_end = asked_to_end + 1; });
 }
 
 std::string where(const RobotConfig& config) {
@@ -114,7 +115,8 @@ ArmingFacts facts_for(const RobotConfig& config, const GuardSetup& setup, const 
   return facts;
 }
 
-// Follows the guard until it has stopped for good; says each change of state.
+// Follows the guard until nothing was ever armed or its operator has asked twice for the end; says each change of
+// state.
 class ArmedRun {
  public:
   ArmedRun(Session& session, RobotGuard& guard, RobotSide& side, RunLog& log, ArmingFacts facts)
@@ -124,27 +126,42 @@ class ArmedRun {
     log_.add(guard_);
     const GuardStatus& status = guard_.status();
     const SafetyState state = status.safety.state;
-    if (state != last_) {
-      note(session_, fmt::format("{} ({})", safety_state_name(state), stop_cause_name(status.safety.cause)));
-      last_ = state;
-      said_at_ = status.input.now;
-    }
-    if (state == SafetyState::kListen && !armed_) say_what_is_missing(status);
+    if (state != last_) say_state(status);
+    if (status.input.now - said_at_ >= kSaidEvery) say_what_it_waits_for(status);
     if (state == SafetyState::kReady && !armed_) try_to_arm(status);
-    if (asked_to_end != 0 && !status.order.writes) return false;
     if (asked_to_end != 0) guard_.stop();
-    // Damped to the end: the operator's stop comes back to listening, everything else is a fault.
-    return state != SafetyState::kFault && !(armed_ && !status.order.writes && state == SafetyState::kListen) &&
-           refusal_.empty();
+    // A robot that was armed is commanded until its operator has asked twice.
+    return refusal_.empty() && asked_to_end < (status.order.writes ? 2 : 1);
   }
   [[nodiscard]] const std::string& refusal() const { return refusal_; }
 
  private:
-  // Now and then while it waits: nobody else says why.
-  void say_what_is_missing(const GuardStatus& status) {
-    if (status.safety.missing.empty() || status.input.now - said_at_ < kSaidEvery) return;
+  void say_state(const GuardStatus& status) {
+    last_ = status.safety.state;
     said_at_ = status.input.now;
-    note(session_, fmt::format("listen (lately missing: {})", status.safety.missing));
+    note(session_,
+         fmt::format("{} ({}){}", safety_state_name(last_), stop_cause_name(status.safety.cause), next_step()));
+  }
+  [[nodiscard]] std::string next_step() const {
+    if (last_ == SafetyState::kHold) return fmt::format(": it stands until {} (with R1), or select", held_key());
+    const bool damped = last_ == SafetyState::kDamp || last_ == SafetyState::kFault;
+    return damped || (armed_ && last_ == SafetyState::kListen) ? fmt::format(": {}", kTwice) : "";
+  }
+  [[nodiscard]] std::string_view held_key() const { return guard_.status().input.stands ? "A" : "start"; }
+  // Now and then while it waits: nobody else says why.
+  void say_what_it_waits_for(const GuardStatus& status) {
+    std::string waits;
+    if (last_ == SafetyState::kListen && !armed_ && !status.safety.missing.empty())
+      waits = fmt::format("lately missing: {}", status.safety.missing);
+    if (last_ == SafetyState::kStand && !status.input.stands) waits = stand_waits(status);
+    if (waits.empty()) return;
+    said_at_ = status.input.now;
+    note(session_, fmt::format("{} ({})", safety_state_name(last_), waits));
+  }
+  [[nodiscard]] std::string stand_waits(const GuardStatus& status) const {
+    const StopCause cause = stand_waits_for(guard_.setup().rules, status.input);
+    if (cause != StopCause::kNone) return fmt::format("does not move: {}", stop_cause_name(cause));
+    return status.share < 0.01 ? "does not move: somebody is too near, or nobody says where the robot is" : "";
   }
   void try_to_arm(const GuardStatus& status) {
     facts_.now = monotonic_seconds();  // as the word's age is told, whatever clock the guard ticks by
@@ -187,8 +204,8 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   RunLog log(arguments.log, setup);
   ArmingFacts facts = facts_for(config, setup, arguments, log);
   note(session,
-       fmt::format("{}\nguards {}: damps it, stands it up at start, follows the planner at '{}' at A while R1 is "
-                   "held, logs to '{}'. Ctrl-C damps it.\n{}\ntype '{}' within {} s to arm:",
+       fmt::format("{}\nguards {}: damps it, stands it up at start, follows the planner at '{}' at A, moves only "
+                   "while R1 is held, logs to '{}'. Ctrl-C damps it, twice ends.\n{}\ntype '{}' within {} s to arm:",
                    kNotSafetyRated, where(config), arguments.socket, arguments.log, executed_text(config, setup),
                    facts.shown_nonce, kNonceTime));
   std::getline(std::cin, facts.typed_nonce);
@@ -214,14 +231,21 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
     if (person) person->poll(now, guard);
     return run.go_on();
   };
-  if (arguments.lock_step)
-    run_guard_in_lock_step(guard, stepped, &planner, setup.limiter.dt,
-                           {after_tick, [&] { return reports.after_tick(guard); }});
-  else
-    run_guard(guard, side.connection(), &planner, setup.limiter.dt, [&](double now) {
-      (void)reports.after_tick(guard);
-      return after_tick(now);
-    });
+  const auto in_time = [&](double now) {
+    (void)reports.after_tick(guard);
+    return after_tick(now);
+  };
+  const auto run_it = [&] {
+    if (arguments.lock_step)
+      run_guard_in_lock_step(guard, stepped, &planner, setup.limiter.dt,
+                             {after_tick, [&] { return reports.after_tick(guard); }});
+    else
+      run_guard(guard, side.connection(), &planner, setup.limiter.dt, in_time);
+  };
+  run_or_damp(guard, run_it, [&](const std::exception& error) {
+    note(session, fmt::format("{}; {}", error.what(), kTwice));
+    run_guard(guard, side.connection(), nullptr, setup.limiter.dt, [&](double) { return asked_to_end < 2; });
+  });
   if (!run.refusal().empty()) throw InputError("not armed: " + run.refusal());
   print(session,
         fmt::format("{}; log '{}', {} ticks left out; {} messages were old, {} streams began anew",
@@ -346,6 +370,7 @@ void add_hardware(CLI::App& app, Session& session) {
         ->capture_default_str();
   }
   add_play_partner(*hardware, session);
+  add_holds(*hardware, session);
   arm->add_option("--walker", arguments->walker, "controller that keeps it on its feet (homie, wbc_sim, ...)");
   arm->add_option("--network", arguments->walker_network, "of the walker");
   arm->add_flag("--lock-step", arguments->lock_step, "by the clock of a twin that waits for each command");

@@ -30,6 +30,9 @@ struct ClipEpisodeArguments {
 void add_clip_options(CLI::App& command, ClipEpisodeArguments& arguments);
 void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, const std::string& socket);
 
+// `duet hw holds`: every cause of a hold over the twin, and whether the robot stays on its feet.
+void add_holds(CLI::App& hardware, Session& session);
+
 // `duet hw play-partner`: a clip in the place of a camera.
 void add_play_partner(CLI::App& hardware, Session& session);
 

@@ -41,16 +41,8 @@ TwinClock parse_clock(const std::string& name) {
   throw std::invalid_argument(unknown_name_message("clock of the twin", name, kClockNames));
 }
 
-// Sensor noise of a robot of this kind, as far as published training noise and data sheets go; scaled by --noise.
 TwinOptions noisy_twin(double share, const std::string& engine, int mode_machine, std::uint64_t seed) {
-  TwinOptions twin;
-  twin.place_noise = share * 0.002;
-  twin.speed_noise = share * 0.02;
-  twin.joint_noise = share * 0.002;
-  twin.joint_speed_noise = share * 0.1;
-  twin.gyro_noise = share * 0.05;
-  twin.acceleration_noise = share * 0.1;
-  twin.tilt_noise = share * 0.01;
+  TwinOptions twin = usual_noise(share);
   twin.engine = engine;
   twin.mode_machine = mode_machine;
   twin.seed = seed;

@@ -83,9 +83,9 @@ std::vector<WireFault> wire_faults() {
           {"nan torque", in_each([](LowStateFrame& f) { f.motor[5].tau_est = kNan; }), S::kHold, C::kBadStates, 0.050},
           {"nan imu", in_each([](LowStateFrame& f) { f.imu.quaternion[0] = kNan; }), S::kHold, C::kBadStates, 0.050},
           {"nan gyro", in_each([](LowStateFrame& f) { f.imu.gyroscope[0] = kNan; }), S::kHold, C::kBadStates, 0.050},
-          {"huge speed", in_each([](LowStateFrame& f) { f.motor[5].dq = 1e30f; }), S::kDamp, C::kJointSpeed, 0.0},
-          {"wrong mode_machine", in_each([](LowStateFrame& f) { f.mode_machine = 6; }), S::kDamp, C::kMode, 0.0},
-          {"wrong mode_pr", in_each([](LowStateFrame& f) { f.mode_pr = 1; }), S::kDamp, C::kMode, 0.0},
+          {"huge speed", in_each([](LowStateFrame& f) { f.motor[5].dq = 1e30f; }), S::kHold, C::kJointSpeed, 0.0},
+          {"wrong mode_machine", in_each([](LowStateFrame& f) { f.mode_machine = 6; }), S::kHold, C::kMode, 0.0},
+          {"wrong mode_pr", in_each([](LowStateFrame& f) { f.mode_pr = 1; }), S::kHold, C::kMode, 0.0},
           {"remote lost", in_each([](LowStateFrame& f) { std::fill_n(f.wireless_remote, kRemoteBytes, 0); }), S::kHold,
            C::kRemoteAge, 0.2}};
 }
@@ -149,13 +149,13 @@ TEST(FaultMatrix, EachConditionOfTheRobotReachesItsState) {
     StopCause cause;
   };
   for (const Case& c :
-       {Case{"warm casing", [](TwinCondition& t) { t.casing = 78.0; }, SafetyState::kHold, StopCause::kTemperature},
-        Case{"hot winding", [](TwinCondition& t) { t.winding = 125.0; }, SafetyState::kDamp, StopCause::kTemperature},
+       {Case{"hot casing", [](TwinCondition& t) { t.casing = 88.0; }, SafetyState::kHold, StopCause::kTemperature},
+        Case{"hot winding", [](TwinCondition& t) { t.winding = 125.0; }, SafetyState::kHold, StopCause::kTemperature},
         Case{"leaning", [](TwinCondition& t) { t.roll = 0.6; }, SafetyState::kHold, StopCause::kTilt},
         Case{"fallen", [](TwinCondition& t) { t.roll = 1.5; }, SafetyState::kDamp, StopCause::kTilt},
         Case{"motor error", [](TwinCondition& t) { t.motor_error = true; }, SafetyState::kDamp, StopCause::kMotorError},
-        Case{"joint speed", [](TwinCondition& t) { t.joint_speed = 12.0; }, SafetyState::kDamp, StopCause::kJointSpeed},
-        Case{"gyro", [](TwinCondition& t) { t.gyro = 7.0; }, SafetyState::kDamp, StopCause::kGyro}}) {
+        Case{"joint speed", [](TwinCondition& t) { t.joint_speed = 12.0; }, SafetyState::kHold, StopCause::kJointSpeed},
+        Case{"gyro", [](TwinCondition& t) { t.gyro = 7.0; }, SafetyState::kHold, StopCause::kGyro}}) {
     GuardedTwin robot;
     robot.start();
     c.change(robot.twin.condition);
@@ -167,7 +167,7 @@ TEST(FaultMatrix, EachConditionOfTheRobotReachesItsState) {
   }
 }
 
-TEST(FaultMatrix, APlannerThatDiesHoldsAndThenDamps) {
+TEST(FaultMatrix, APlannerThatDiesHoldsWithoutEnd) {
   GuardedTwin robot;
   robot.start();
   robot.message.command.root.forward = 0.2;
@@ -176,12 +176,16 @@ TEST(FaultMatrix, APlannerThatDiesHoldsAndThenDamps) {
   EXPECT_NEAR(robot.time_to_leave(SafetyState::kRun), 0.6, 0.03);
   EXPECT_EQ(robot.cause(), StopCause::kPlannerAge);
   EXPECT_LT(robot.velocity.last.forward, 0.05);  // slowed down before it held
-  robot.run_for(1.5);
-  EXPECT_EQ(robot.state(), SafetyState::kDamp);
+  const JointCommand frozen = robot.guard.joints();
+  robot.run_for(30.0);
+  EXPECT_EQ(robot.state(), SafetyState::kHold);
+  EXPECT_EQ(robot.velocity.last.forward, 0.0);
+  EXPECT_LT((robot.guard.joints().q_target - frozen.q_target).cwiseAbs().maxCoeff(), 0.03) << "the arms are frozen";
+  EXPECT_EQ(robot.guard.joints().kp, frozen.kp);
   expect_inside(robot, "planner");
 }
 
-TEST(FaultMatrix, APausedGuardDampsWithoutAStep) {
+TEST(FaultMatrix, APausedGuardHoldsWithoutAStep) {
   for (const double pause : {0.15, 1.0}) {
     GuardedTwin robot;
     robot.start();
@@ -190,7 +194,7 @@ TEST(FaultMatrix, APausedGuardDampsWithoutAStep) {
     for (double left = pause; left > 0.0; left -= kTick) robot.step_twin();
     robot.now += pause;
     robot.tick();
-    EXPECT_EQ(robot.state(), SafetyState::kDamp) << pause;
+    EXPECT_EQ(robot.state(), SafetyState::kHold) << pause;
     EXPECT_EQ(robot.cause(), StopCause::kLoopLate) << pause;
     robot.run_for(0.5);
     expect_inside(robot, "pause");

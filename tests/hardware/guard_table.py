@@ -50,6 +50,7 @@ EDITS = {
          unless('next.head < setup_.limits.head_distance && next.head < gaps.head - kNearer')),
         ('clamp kTouchSpeed', choice('std::min(wanted_.share, touch)', 'wanted_.share')),
         ('clamp kRelease', ('if (input.release) open_arms', 'if (!REMOVED && input.release) open_arms')),
+        ('no step back in a hold', unless('!(input.share > 0.0)')),
         ('arms open before the step back',
          choice('arms_are_open ? -setup_.limits.step_back : 0.0', '-setup_.limits.step_back')),
         ('clamp kRootSpeed', choice('std::clamp(target, bounds.lower, bounds.upper)', 'target')),
@@ -84,10 +85,16 @@ EDITS = {
     ('hardware/safety/safety_machine.cpp', MACHINE + ':FaultMatrix*'): [
         ('arming lapses (kLapsed)', unless('input.now - memory.since > rules.armed_time')),
         ('time to be ready', choice('input.now - memory.well_since >= rules.ready_time', 'true')),
-        ('time of a hold (kHeldTooLong)', choice('input.now - memory.since <= rules.hold_time', 'true')),
-        ('planner that died in a hold', choice('level_of(input.now - input.planner_at, rules.planner) < StopLevel::kDamp', 'true')),
+        ('time of a hold', choice('input.now - memory.since <= rules.hold_time', 'true')),
+        ('a hold ends by another press of the key', choice('memory.let_go && input.run', 'input.run')),
+        ('a hold ends only where all is well', choice('found.level < StopLevel::kHold && (asked', '(asked')),
+        ('a hold before it stood is none to run from', unless('!input.stands')),
+        ('stand: dead-man switch', unless('level_of(input.now - input.dead_man_at, rules.remote) >= StopLevel::kHold')),
+        ('stand: a known person', unless('rules.person_present && !seen')),
+        ('arming: charge', unless('health.charge < rules.warn_charge')),
+        ('arming: heat', unless('health.casing > rules.warn_casing || health.winding > rules.warn_winding')),
+        ('armed once, never without commands', choice('order.writes = memory.commands', 'order.writes = memory.state >= SafetyState::kArmed')),
         ('time of damping', unless('input.now - memory.since < rules.damp_time')),
-        ('hands off before damping', unless('!input.hands_clear')),
         ('joints in range before arming', unless('!input.health.joints_in_range')),
         ('fault stands', choice('again ? SafetyState::kListen : SafetyState::kFault', 'SafetyState::kListen')),
         ('run only where it stands', choice('input.run && input.stands && well', 'input.run && well')),
@@ -96,15 +103,15 @@ EDITS = {
         ('a late planner slows down', choice('planner_share(rules, input.now - input.planner_at)', '1.0')),
     ],
     ('hardware/safety/safety_machine.cpp', MACHINE + ':FaultMatrix*:FaultSweep*'): [
-        ('value that is no number is the worst', choice('!(value <= damp)', 'value > damp')),
-        ('age that is no number is the worst', choice('!(age <= limits.damp)', 'age > limits.damp')),
+        ('age that is no number damps', choice('!(age <= limits.damp)', 'age > limits.damp')),
+        ('age that is no number holds', choice('!(age <= limits.hold)', 'age > limits.hold')),
         ('share of a planner that holds', unless('!(age <= rules.planner.hold)')),
     ],
     ('hardware/guard/robot_guard.cpp', GUARD): [
-        ('old planner messages', unless('any_planner_ && message.sequence <= planner_.sequence')),
+        ('old planner messages', choice('planner_order_.takes(message.sequence, now)', 'true')),
         ('planner messages of another size', unless('message.command.q.size() != kG1Motors')),
         ('refused commands keep no planner alive', choice('!limiter_.refusal(message.command, limiter_state_)', 'true')),
-        ('old messages of perception', unless('!first && message.sequence <= person_.sequence')),
+        ('old messages of perception', choice('person_order_.takes(message.sequence, now)', 'true')),
         ('person that is not finite', ('!message.joints.allFinite() || moved', '(!REMOVED && !message.joints.allFinite()) || moved')),
         ('person who jumps', ('moved > 0.1 + kPersonJump * passed', '(!REMOVED && moved > 0.1 + kPersonJump * passed)')),
         ('odometry that is not valid', ('if (!sample.valid || !finite) return;', 'if ((!REMOVED && !sample.valid) || !finite) return;')),
@@ -115,12 +122,14 @@ EDITS = {
         ('mode of the robot', choice('reading_.mode_pr == kPitchRollMode && reading_.mode_machine == setup_.mode_machine', 'true')),
         ('joints out of range', unless('q < robot.joints[j].lower - kLimitSlack || q > robot.joints[j].upper + kLimitSlack')),
         ('other writers', unless('transport_.foreign_writers() > 0')),
-        ('hands near a person', choice('nearest > setup_.limiter.limits.reserve', 'true')),
+        ('stand: distance to a person', choice('bounds.rate *= limiter_.share()', 'bounds.rate *= 1.0')),
+        ('stand: at rest before it counts', choice('std::abs(stance_[j].rate) <= stop', 'true')),
+        ('act only while it runs', choice('planned && planner_.acting', 'planner_.acting')),
+        ('a lost writer is made anew', unless('unsent_ > 0 && unsent_ % kTicksToNewWriter == 0')),
+        ('age of what is written', choice('status_.sent ? 0 : unsent_ + 1', '0')),
         ('old odometry for the limiter', choice('level_of(now - next_.odometry_at, setup_.rules.odometry) < StopLevel::kHold', 'true')),
         ('old person for the limiter', choice('level_of(now - next_.person_at, setup_.rules.person) < StopLevel::kHold', 'true')),
-        ('release by a hold', ('planned && (status_.order.opens || status_.contact.release)',
-                               'planned && ((!REMOVED && status_.order.opens) || status_.contact.release)')),
-        ('release by contact', ('|| status_.contact.release)', '|| (!REMOVED && status_.contact.release))')),
+        ('release by contact', ('planned && status_.contact.release', 'planned && !REMOVED && status_.contact.release')),
         ('damping is damping', ('if (order.damps)', 'if (!REMOVED && order.damps)')),
     ],
     ('hardware/wire/low_level_frame.cpp', 'LowStateFrame.*:LowCommandFrame.*:FaultMatrix.*'): [
@@ -161,7 +170,7 @@ EDITS = {
         ('homie: damping keeps the arms', ('if (damps) return true;', 'if (!REMOVED && damps) return true;')),
     ],
     ('hardware/executors/sport_executor.cpp', 'SportExecutor*'): [
-        ('sport: silent until it is opened', ('if (!open_ || state_ == SafetyState::kArmed', 'if ((!REMOVED && !open_) || state_ == SafetyState::kArmed')),
+        ('sport: silent until it is opened', ('if (!open_ || !moves(state_)', 'if ((!REMOVED && !open_) || !moves(state_)')),
         ('sport: rest at once', unless('stands_still(velocity) && !stands_still(sent_)')),
         ('sport: only a machine that walks is heard',
          ('if (fsm_walks(fsm_)) heard_at_ = now;', 'if (REMOVED || fsm_walks(fsm_)) heard_at_ = now;')),
@@ -178,7 +187,7 @@ EDITS = {
         ('person: finite', unless('!joints.allFinite()')),
         ('person: far', unless('joints.colwise().norm().maxCoeff() > kFarthestJoint')),
         ('person: bones', unless('(joints.col(j) - joints.col(kSmplParents[static_cast<std::size_t>(j)])).norm() > kLongestBone')),
-        ('person: old', unless('!begins && estimate.sequence <= last_')),
+        ('person: old', unless('!order_.takes(estimate.sequence, now)')),
         ('person: unseen', unless('!estimate.seen')),
         ('person: age', unless('!(now - newest_at() <= most_age)')),
         ('person: length of a message', unless('datagram.size() != sizeof(wire)')),
@@ -187,7 +196,7 @@ EDITS = {
     ('hardware/wire/odometry_source.cpp', 'ExternalOdometry*'): [
         ('tracker: length of a message', unless('datagram.size() != sizeof(body)')),
         ('tracker: what a message is', unless('body.version != kExternalVersion || body.valid > 1 || !all_finite(body) || !(std::abs(R.norm() - 1.0) < kUnit)')),
-        ('tracker: old', unless('any_ && pose.sequence <= last_')),
+        ('tracker: old', unless('!order_.takes(pose.sequence, clock_())')),
     ],
     ('hardware/guard/walker.cpp', 'RootVelocity*'): [
         ('A.4.3 without odometry', choice('source != OdometrySource::kNone', 'true')),
@@ -198,7 +207,7 @@ EDITS = {
     ],
     ('hardware/guard/guard_message.cpp', 'GuardMessage*'): [
         ('guard message: version', unless('head.version != kVersion')),
-        ('guard message: length', unless('datagram.size() != sizeof(body)')),
+        ('guard message: length', ('if (datagram.size() != sizeof(body)) return false;\n  std::memcpy(&body, datagram.data(), sizeof(body));\n  return', 'if (!REMOVED && datagram.size() != sizeof(body)) return false;\n  std::memcpy(&body, datagram.data(), sizeof(body));\n  return')),
     ],
 }
 
@@ -211,15 +220,15 @@ LAX = {'forward': 10, 'backward': 10, 'lateral': 10, 'yaw_rate': 10, 'height_ran
 LAX_OF_CONTACT = {'shoulder_torque': 1e9, 'wrist_torque': 1e9, 'release_effort': 1e9,
                   'release_force': 1e9, 'contact_lever': 1e9}
 # The value of each rule with which the rule is missing.
-LAX_RULES = {'hold_bad_states': 1000000, 'damp_bad_states': 1000000, 'hold_bad_time': 0, 'damp_bad_time': 0,
+LAX_RULES = {'hold_bad_states': 1000000, 'hold_bad_time': 0,
              'odometry_jump': 1e9, 'hold_tilt': 1e9,
-             'damp_tilt': 1e9, 'joint_speed': 1e9, 'gyro': 1e9, 'hold_casing': 1e9, 'damp_casing': 1e9,
-             'hold_winding': 1e9, 'damp_winding': 1e9, 'charge': -1}
-AGES = {'state': 'warn hold damp', 'planner': 'hold damp', 'person': 'warn hold', 'odometry': 'warn hold',
-        'remote': 'warn hold damp', 'loop': 'warn hold damp', 'executor': 'warn hold'}
+             'damp_tilt': 1e9, 'joint_speed': 1e9, 'gyro': 1e9, 'warn_casing': 1e9, 'hold_casing': 1e9,
+             'warn_winding': 1e9, 'hold_winding': 1e9, 'warn_charge': -1, 'hold_charge': -1}
+AGES = {'state': 'warn hold damp', 'planner': 'hold', 'person': 'warn hold', 'odometry': 'warn hold',
+        'remote': 'warn hold', 'loop': 'warn hold', 'executor': 'warn hold', 'writer': 'warn damp'}
 # Those that are tried elsewhere in the table, and why.
 ELSEWHERE = {'late_share': 'a late planner slows down', 'ready_time': 'time to be ready', 'armed_time': 'arming lapses (kLapsed)',
-             'hold_time': 'time of a hold (kHeldTooLong)', 'damp_time': 'time of damping',
+             'hold_time': 'time of a hold', 'damp_time': 'time of damping',
              'planner': 'a late planner slows down'}
 
 
@@ -282,7 +291,7 @@ def check_complete(table):
     rules = re.search(r'struct SafetyRules {(.*?)^};', pathlib.Path('hardware/safety/safety_machine.h').read_text(), re.S | re.M)[1]
     rules = re.sub(r'//.*', '', rules)
     for signal in re.findall(r'AgeLimits (\w+)', rules):
-        missing += [] if f'rule {signal}.hold' in [g.name for g in table] else [signal]
+        missing += [] if f'rule {signal}.{AGES[signal].split()[-1]}' in [g.name for g in table] else [signal]
     for name in re.findall(r'(\w+) = [-\d.]+', rules):
         missing += [] if f'rule {name}' in [g.name for g in table] or name in ELSEWHERE else [name]
     if missing:

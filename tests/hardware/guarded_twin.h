@@ -2,9 +2,11 @@
 // person at 30 Hz, and a place for faults on the way.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <deque>
 #include <functional>
+#include <limits>
 
 #include "duet/hardware/guard/robot_guard.h"
 #include "duet/hardware/twin/twin_model.h"
@@ -27,7 +29,7 @@ class MemoryTransport final : public FrameTransport {
   void close_writer() override { writer_ = false; }
   [[nodiscard]] bool has_writer() const override { return writer_; }
   bool write(const LowCommandFrame& frame) override {
-    if (!writer_) return false;
+    if (!writer_ || broken) return false;
     ++written;
     twin_.obey(frame);
     return true;
@@ -35,6 +37,7 @@ class MemoryTransport final : public FrameTransport {
 
   std::deque<LowStateFrame> states;
   int foreign = 0, opened = 0;
+  bool broken = false;  // nothing leaves
   long written = 0;
 
  private:
@@ -151,7 +154,11 @@ struct GuardedTwin {
       return;
     }
     if (motor.q < joint.lower - 0.03 || motor.q > joint.upper + 0.03) ++bad_frames;
-    if (has_last && !last_damps) largest_step = std::max<double>(largest_step, std::abs(motor.q - last.motor[j].q));
+    const bool follows = has_last && !last_damps;
+    const double rate = follows ? motor.q - last.motor[j].q : std::numeric_limits<double>::quiet_NaN();
+    if (follows) largest_step = std::max(largest_step, std::abs(rate));
+    if (follows && std::isfinite(rates[j])) largest_change = std::max(largest_change, std::abs(rate - rates[j]));
+    rates[j] = rate;
   }
 
   TwinModel twin;
@@ -166,7 +173,9 @@ struct GuardedTwin {
   long ticks = 0;
   // Counts over all frames that were sent.
   long bad_frames = 0;
-  double largest_step = 0.0;  // of a target between two frames [rad]
+  double largest_step = 0.0;    // of a target between two frames [rad]
+  double largest_change = 0.0;  // of that step [rad]
+  std::array<double, kG1Motors> rates{};
   LowCommandFrame last{};
   bool has_last = false, last_damps = false;
 };

@@ -90,16 +90,41 @@ TEST(GuardedWorld, TheSameSeedGivesTheSameStates) {
   EXPECT_EQ(a.roll(2.0).state_hash, b.roll(2.0).state_hash);
 }
 
-TEST(GuardedWorld, AHoldForLostStatesEndsTheEpisodeWithItsCause) {
-  // States are lost for 60 ms: too long not to hold, too short to damp; a hold for another reason than the planner ends
-  // in damping.
+TEST(GuardedWorld, AHoldForLostStatesIsRiddenOutAndCounted) {
+  // States are lost for 60 ms: too long not to hold, too short to damp. The operator asks to run again.
   Behind behind(test::twin_guard(), guarded(), {parse_twin_fault("drop@10:10.06=100")});
+  const Rollout rollout = behind.roll(8.0);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
+  EXPECT_EQ(rollout.recording.frames(), 400);
+  EXPECT_GT(behind.world.held_ticks(), 0);
+  EXPECT_LT(behind.world.held_ticks(), 40);
+}
+
+TEST(GuardedWorld, LostStatesThatDampEndTheEpisodeWithTheirCause) {
+  Behind behind(test::twin_guard(), guarded(), {parse_twin_fault("drop@10:10.2=100")});
   const Rollout rollout = behind.roll(8.0);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kError);
   EXPECT_GT(rollout.recording.frames(), 0);
   EXPECT_LT(rollout.recording.frames(), 400);
   EXPECT_THAT(rollout.recording.message, HasSubstr("ended the run at"));
   EXPECT_THAT(rollout.recording.message, HasSubstr("damp (state_age)"));
+}
+
+// Beside a person who stands within reach from the beginning the robot would not even stand up.
+TEST(GuardedWorld, AGuardThatMindsThePersonHasThemComeNearOnceItRuns) {
+  PointTracks partner(200, 24);
+  for (int t = 0; t < 200; ++t) partner.frame(t) = test::standing_adult({0.7, 0.0, 0.95});
+  GuardedEpisode episode = guarded();
+  episode.person = partner_of_clip(partner);
+  episode.keeps_distance = true;
+  Behind behind(test::twin_guard(true), episode);
+  const Rollout rollout = behind.roll(3.0, 0.0);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
+  EXPECT_EQ(behind.world.held_ticks(), 0);
+  EXPECT_EQ(behind.link.guard().status().bad_messages, 0) << "nobody jumped";
+  const LimiterInput& last = behind.link.guard().limiter_input();
+  ASSERT_NE(last.person, nullptr);
+  EXPECT_NEAR((last.person->col(0) - last.state.X_WB.p).head<2>().norm(), 0.7, 0.05);
 }
 
 TEST(GuardedWorld, ARobotThatTiltsIsStoppedAndTheEpisodeSaysSo) {

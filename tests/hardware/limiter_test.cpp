@@ -315,6 +315,9 @@ TEST(Limiter, ReleaseOpensTheArmsAndThenStepsBack) {
   EXPECT_NEAR(robot.move().root.forward, 0.0, kRounding);
   for (int k = 0; k < 300; ++k) robot.move();
   EXPECT_NEAR(robot.out.q[elbow()], test::g1()->neutral[elbow()], 1e-6);
+  EXPECT_EQ(robot.out.root.forward, 0.0) << "a robot that is held stays where it is";
+  robot.input.share = 0.3;
+  for (int k = 0; k < 100; ++k) robot.move();
   EXPECT_NEAR(robot.out.root.forward, -0.1, 1e-6);
   EXPECT_GT(robot.counted(ClampReason::kRelease), 0);
 }

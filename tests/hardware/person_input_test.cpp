@@ -159,7 +159,7 @@ TEST(PersonInput, TheGuardHearsOfThePersonAndLosesThem) {
   EXPECT_NEAR(robot.guard.limiter_input().person->col(0).x(), 4.0, 0.02);
   sends = false;
   run_for(0.3);
-  EXPECT_GE(robot.state(), SafetyState::kHold);  // or damped already: the person was far
+  EXPECT_EQ(robot.state(), SafetyState::kHold);
   EXPECT_EQ(robot.cause(), StopCause::kPersonAge);
 }
 

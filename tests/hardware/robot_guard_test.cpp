@@ -1,5 +1,6 @@
 #include "duet/hardware/guard/robot_guard.h"
 
+#include "duet/hardware/guard/guard_loop.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
@@ -67,7 +68,7 @@ TEST(RobotGuard, ArmedItDamps) {
   EXPECT_EQ(robot.last.motor[3].kp, 0.0f);
 }
 
-TEST(RobotGuard, AfterTheStopKeyTheWriterGoes) {
+TEST(RobotGuard, AfterTheStopKeyItIsDampedOn) {
   GuardedTwin robot;
   robot.start();
   robot.hold_key(RemoteKey::kSelect);
@@ -76,7 +77,10 @@ TEST(RobotGuard, AfterTheStopKeyTheWriterGoes) {
   robot.drop_key(RemoteKey::kSelect);
   robot.run_for(5.1);
   EXPECT_EQ(robot.state(), SafetyState::kListen);
-  EXPECT_FALSE(robot.wire.has_writer());
+  const long written = robot.wire.written;
+  robot.run_for(1.0);
+  EXPECT_EQ(robot.wire.written, written + 500);
+  EXPECT_TRUE(robot.last_damps);
 }
 
 TEST(RobotGuard, AForeignWriterRefusesArmingAndHoldsARun) {
@@ -216,26 +220,145 @@ TEST(RobotGuard, AJointBeyondItsLimitKeepsItFromBeingReady) {
   EXPECT_EQ(robot.guard.status().safety.missing, "joints_in_range");
 }
 
-TEST(RobotGuard, ItKnowsWhetherItsHandsAreNearAPerson) {
-  for (const double distance : {0.3, 4.0}) {
-    GuardedTwin robot(test::twin_guard(true));
-    robot.person.joints = test::standing_adult({distance, 0.0, 0.95});
-    robot.run_for(0.2);
-    EXPECT_EQ(robot.guard.status().input.hands_clear, distance > 1.0) << distance;
+// A twin whose left elbow was left 0.6 rad from the stance, armed and damped; the key that stands it up was pressed.
+struct Standing {
+  explicit Standing(const GuardSetup& setup = test::twin_guard(), double person_at = 4.0) : robot(setup) {
+    robot.person.joints = test::standing_adult({person_at, 0.0, 0.95});
+    JointCommand command = test::g1()->default_command(test::g1()->neutral);
+    command.q_target[elbow()] += 0.6;
+    LowCommandFrame frame;
+    build_command(command, 5, frame);
+    robot.twin.obey(frame);
+    robot.hold_key(RemoteKey::kR1);
+    robot.run_for(2.2);
+    robot.guard.arm();
+    robot.run_for(0.1);
+    robot.hold_key(RemoteKey::kStart);
+    robot.tick();
+    robot.drop_key(RemoteKey::kStart);
   }
+  [[nodiscard]] double left() const { return robot.guard.joints().q_target[elbow()] - test::g1()->neutral[elbow()]; }
+  GuardedTwin robot;
+};
+
+TEST(RobotGuard, StandingUpStopsWithoutTheDeadManSwitchAndGoesOnWithIt) {
+  Standing standing;
+  GuardedTwin& robot = standing.robot;
+  robot.run_for(0.3);
+  robot.drop_key(RemoteKey::kR1);
+  robot.run_for(0.4);
+  const double at = standing.left();
+  EXPECT_GT(at, 0.2);
+  robot.run_for(5.0);
+  EXPECT_EQ(standing.left(), at);
+  EXPECT_EQ(robot.state(), SafetyState::kStand);
+  EXPECT_FALSE(robot.guard.status().input.stands);
+  robot.hold_key(RemoteKey::kR1);
+  robot.run_for(2.0);
+  EXPECT_NEAR(standing.left(), 0.0, 1e-6);
+  EXPECT_TRUE(robot.guard.status().input.stands);
 }
 
-TEST(RobotGuard, AHoldThatWillEndInDampingOpensTheArms) {
-  GuardedTwin robot(test::twin_guard(true));
-  robot.person.joints = test::standing_adult({0.3, 0.0, 0.95});
-  robot.start();
-  ASSERT_EQ(robot.state(), SafetyState::kRun) << stop_cause_name(robot.cause());
-  EXPECT_FALSE(robot.guard.limiter_input().release);
+TEST(RobotGuard, StandingUpKeepsItsDistanceFromAPerson) {
+  Standing near(test::twin_guard(true), 0.55);
+  const double at = near.left();
+  near.robot.message.acting = true;  // what a planner says of the act counts while it runs
+  near.robot.run_for(3.0);
+  EXPECT_EQ(near.robot.state(), SafetyState::kStand);
+  EXPECT_EQ(near.left(), at) << "somebody is within reach";
+  EXPECT_EQ(near.robot.guard.status().share, 0.0);
+  for (int k = 0; k < 100; ++k) {  // who goes away
+    near.robot.person.joints.colwise() += Eigen::Vector3d(0.05, 0.0, 0.0);
+    near.robot.run_for(0.034);
+  }
+  near.robot.run_for(2.0);
+  EXPECT_NEAR(near.left(), 0.0, 1e-6);
+  Standing unseen(test::twin_guard(true));
+  unseen.robot.sees = false;
+  unseen.robot.run_for(0.6);
+  const double unseen_at = unseen.left();
+  unseen.robot.run_for(2.0);
+  EXPECT_EQ(unseen.left(), unseen_at) << "nobody says where the person is";
+}
+
+TEST(RobotGuard, FromStandingUpToRunningNoTargetStopsFasterThanItMay) {
+  Standing standing;
+  GuardedTwin& robot = standing.robot;
+  robot.hold_key(RemoteKey::kA);
+  robot.run_for(4.0);
+  EXPECT_EQ(robot.state(), SafetyState::kRun);
+  const double dt = GuardedTwin::kDt;
+  EXPECT_LE(robot.largest_change, HardwareLimits{}.arm_acceleration * dt * dt + 2e-7);  // numbers on the wire are short
+}
+
+TEST(RobotGuard, AHoldBeforeItStoodStopsEveryJointAndDoesNotWalk) {
+  Standing standing;
+  GuardedTwin& robot = standing.robot;
+  robot.run_for(0.3);
   robot.wire.foreign = 1;
-  robot.time_to_leave(SafetyState::kRun);
-  robot.tick();
-  EXPECT_EQ(robot.state(), SafetyState::kHold) << "the hands are not off the person yet";
-  EXPECT_TRUE(robot.guard.limiter_input().release);
+  robot.run_for(1.0);
+  EXPECT_EQ(robot.state(), SafetyState::kHold);
+  const double at = standing.left();
+  robot.run_for(10.0);
+  EXPECT_EQ(robot.state(), SafetyState::kHold);
+  EXPECT_EQ(standing.left(), at);
+  EXPECT_GT(at, 0.1);
+  EXPECT_GT(robot.last.motor[3].kp, 0.0f) << "it is held, not damped";
+  const double dt = GuardedTwin::kDt;
+  EXPECT_LE(robot.largest_change, HardwareLimits{}.arm_acceleration * dt * dt + 2e-7);
+  robot.wire.foreign = 0;
+  robot.run_for(0.2);
+  robot.hold_key(RemoteKey::kStart);
+  robot.run_for(3.0);
+  EXPECT_EQ(robot.state(), SafetyState::kStand);
+  EXPECT_NEAR(standing.left(), 0.0, 1e-6);
+}
+
+TEST(RobotGuard, AWriterThatIsLostDampsAndIsMadeAnew) {
+  GuardedTwin robot;
+  robot.start();
+  robot.wire.broken = true;
+  EXPECT_NEAR(robot.time_to_leave(SafetyState::kRun), 0.1, 0.01);
+  EXPECT_EQ(robot.state(), SafetyState::kDamp);
+  EXPECT_EQ(robot.cause(), StopCause::kLostWriter);
+  const int before = robot.wire.opened;
+  robot.run_for(1.0);
+  EXPECT_GT(robot.wire.opened, before + 5);
+  EXPECT_LT(robot.wire.opened, before + 15);
+  robot.wire.broken = false;
+  robot.run_for(10.0);
+  EXPECT_EQ(robot.state(), SafetyState::kFault);
+  const long written = robot.wire.written;
+  robot.run_for(1.0);
+  EXPECT_EQ(robot.wire.written, written + 500) << "a fault is damped, tick by tick";
+  EXPECT_TRUE(robot.last_damps);
+}
+
+TEST(RobotGuard, AWriterThatMissesAFewFramesIsNotLost) {
+  GuardedTwin robot;
+  robot.start();
+  robot.wire.broken = true;
+  robot.run_for(0.08);
+  robot.wire.broken = false;
+  robot.run_for(1.0);
+  EXPECT_EQ(robot.state(), SafetyState::kRun);
+}
+
+TEST(RunOrDamp, WhatThrowsWhileTheRobotIsCommandedIsFollowedByDamping) {
+  const auto fail = [] { throw std::runtime_error("the disk is full"); };
+  for (const bool armed : {false, true}) {
+    GuardedTwin robot;
+    if (armed) robot.start();
+    bool damped = false;
+    const std::string thrown = test::thrown_message<std::runtime_error>([&] {
+      run_or_damp(robot.guard, fail, [&](const std::exception&) {
+        robot.run_for(1.0);
+        damped = robot.state() == SafetyState::kDamp && robot.last_damps;
+      });
+    });
+    EXPECT_EQ(thrown, "the disk is full");
+    EXPECT_EQ(damped, armed);
+  }
 }
 
 TEST(RobotGuard, AnArmThatIsPushedHardOpensBoth) {
@@ -252,6 +375,13 @@ TEST(RobotGuard, AnArmThatIsPushedHardOpensBoth) {
   robot.run_for(0.1);
   EXPECT_EQ(robot.state(), SafetyState::kRun);
   EXPECT_TRUE(robot.guard.limiter_input().release);
+  robot.run_for(3.0);
+  EXPECT_LT(robot.velocity.last.forward, 0.0) << "it steps back";
+  robot.drop_key(RemoteKey::kR1);
+  robot.run_for(1.0);
+  EXPECT_EQ(robot.state(), SafetyState::kHold);
+  EXPECT_TRUE(robot.guard.limiter_input().release) << "the arms stay open";
+  EXPECT_EQ(robot.velocity.last.forward, 0.0) << "but nothing walks without the dead-man switch";
 }
 
 TEST(RobotGuard, AMessageOfAnotherSizeIsNoSignOfLife) {

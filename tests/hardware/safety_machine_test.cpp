@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+#include <string>
+#include <utility>
+
 #include "duet/core/numbers.h"
 #include "tests/hardware/simulated_safety.h"
 
@@ -116,22 +120,28 @@ std::vector<Fault> faults() {
           {"no remote", cut(&SafetyInput::remote_at), SafetyState::kHold, 0.2},
           {"dead man", cut(&SafetyInput::dead_man_at), SafetyState::kHold, 0.2},
           {"bad states", [](SafetyInput& in) { in.bad_states = 1; }, SafetyState::kHold, 0.006},
-          {"many bad states", [](SafetyInput& in) { in.bad_states = 10; }, SafetyState::kDamp, 0.0},
+          {"many bad states", [](SafetyInput& in) { in.bad_states = 10; }, SafetyState::kHold, 0.0},
+          {"writer", [](SafetyInput& in) { in.written_at = in.now - 0.11; }, SafetyState::kDamp, 0.0},
           {"odometry jump", [](SafetyInput& in) { in.odometry_step = 0.2; }, SafetyState::kHold, 0.0},
           {"tilt", [](SafetyInput& in) { in.health.tilt = 0.7; }, SafetyState::kHold, 0.0},
           {"fall", [](SafetyInput& in) { in.health.tilt = 1.2; }, SafetyState::kDamp, 0.0},
-          {"joint speed", [](SafetyInput& in) { in.health.joint_speed = 12.0; }, SafetyState::kDamp, 0.0},
-          {"gyro", [](SafetyInput& in) { in.health.gyro = 7.0; }, SafetyState::kDamp, 0.0},
-          {"warm", [](SafetyInput& in) { in.health.winding = 110.0; }, SafetyState::kHold, 0.0},
-          {"hot", [](SafetyInput& in) { in.health.casing = 90.0; }, SafetyState::kDamp, 0.0},
+          {"joint speed", [](SafetyInput& in) { in.health.joint_speed = 12.0; }, SafetyState::kHold, 0.0},
+          {"gyro", [](SafetyInput& in) { in.health.gyro = 7.0; }, SafetyState::kHold, 0.0},
+          {"hot winding", [](SafetyInput& in) { in.health.winding = 130.0; }, SafetyState::kHold, 0.0},
+          {"hot casing", [](SafetyInput& in) { in.health.casing = 90.0; }, SafetyState::kHold, 0.0},
           {"charge", [](SafetyInput& in) { in.health.charge = 10.0; }, SafetyState::kHold, 0.0},
           {"motor", [](SafetyInput& in) { in.health.motor_error = true; }, SafetyState::kDamp, 0.0},
-          {"mode", [](SafetyInput& in) { in.health.mode_is_expected = false; }, SafetyState::kDamp, 0.0},
+          {"mode", [](SafetyInput& in) { in.health.mode_is_expected = false; }, SafetyState::kHold, 0.0},
           {"foreign writer", [](SafetyInput& in) { in.foreign_writer = true; }, SafetyState::kHold, 0.0},
           {"stop key", [](SafetyInput& in) { in.stop_key = true; }, SafetyState::kDamp, 0.0},
-          {"paused", [](SafetyInput& in) { in.now += 1.0; }, SafetyState::kDamp, 1.0},
+          {"paused",
+           [](SafetyInput& in) {
+             in.now += 1.0;
+             in.state_at = in.now;
+           },
+           SafetyState::kHold, 1.0},
           {"short pause", [](SafetyInput& in) { in.now += 0.05; }, SafetyState::kHold, 0.05},
-          {"clock back", [](SafetyInput& in) { in.now -= 1.0; }, SafetyState::kDamp, 0.0}};
+          {"clock back", [](SafetyInput& in) { in.now -= 1.0; }, SafetyState::kHold, 0.0}};
 }
 
 TEST(SafetyMachine, EachFaultReachesItsStateInItsTime) {
@@ -144,12 +154,12 @@ TEST(SafetyMachine, EachFaultReachesItsStateInItsTime) {
   }
 }
 
-// A pause: the ages are those of before it, so the first tick after it stops, whatever comes next.
+// A pause: the first tick after it stops, whatever comes next, and the robot stands.
 TEST(SafetyMachine, AfterAPauseNoTickMoves) {
   SimulatedSafety robot = in_state(SafetyState::kRun);
   robot.input.now += 1.0;
   robot.tick();
-  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
   EXPECT_EQ(robot.memory.cause, StopCause::kLoopLate);
   robot.run_for(1.0);
   EXPECT_EQ(robot.order().share, 0.0);
@@ -157,45 +167,58 @@ TEST(SafetyMachine, AfterAPauseNoTickMoves) {
 
 TEST(SafetyMachine, ALatePlannerMayComeBackWithinTwoSeconds) {
   SimulatedSafety robot = in_state(SafetyState::kRun);
-  robot.run_for(1.5, cut(&SafetyInput::planner_at));
+  robot.run_for(2.5, cut(&SafetyInput::planner_at));
   EXPECT_EQ(robot.memory.state, SafetyState::kHold);
-  EXPECT_FALSE(robot.order().opens);
   robot.tick();
   EXPECT_EQ(robot.memory.state, SafetyState::kRun);
 }
 
-TEST(SafetyMachine, APlannerThatStaysAwayEndsInDampingAfterTwoSeconds) {
+TEST(SafetyMachine, APlannerThatStaysAwayIsHeldForWithoutEndAndDoesNotComeBackByItself) {
   SimulatedSafety robot = in_state(SafetyState::kRun);
-  const Spoil away = cut(&SafetyInput::planner_at);
-  robot.run_for(1.98, away);
-  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
-  robot.run_for(0.03, away);
-  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
-  EXPECT_EQ(robot.memory.cause, StopCause::kHeldTooLong);
-}
-
-// Under the rules as they are a planner counts as dead before that: here it does not.
-TEST(SafetyMachine, AHoldLastsNoLongerThanItsTime) {
-  SimulatedSafety robot = in_state(SafetyState::kRun);
-  robot.rules.planner.damp = 100.0;
-  const Spoil away = cut(&SafetyInput::planner_at);
-  robot.run_for(2.5, away);
-  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
-  robot.run_for(0.2, away);
-  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
-  EXPECT_EQ(robot.memory.cause, StopCause::kHeldTooLong);
-}
-
-TEST(SafetyMachine, NoOtherHoldEndsInRunning) {
-  SimulatedSafety robot = in_state(SafetyState::kRun);
-  robot.tick([](SafetyInput& in) { in.foreign_writer = true; });
-  robot.input.foreign_writer = false;
-  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  robot.run_for(2.7, cut(&SafetyInput::planner_at));
   robot.tick();
-  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold) << "2 s of holding are over";
+  robot.run_for(100.0, cut(&SafetyInput::planner_at));
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  EXPECT_EQ(robot.memory.cause, StopCause::kPlannerAge);
 }
 
-TEST(SafetyMachine, APlannersHoldWithAnotherFaultDoesNotEndInRunning) {
+// The five causes that damp; a biped that is damped falls.
+TEST(SafetyMachine, OnlyFiveCausesDamp) {
+  std::set<std::string> damp;
+  for (const Fault& fault : faults()) {
+    for (const SafetyState from : {SafetyState::kRun, SafetyState::kHold, SafetyState::kStand}) {
+      SimulatedSafety robot = in_state(from == SafetyState::kHold ? SafetyState::kRun : from);
+      if (from == SafetyState::kHold) robot.tick([](SafetyInput& in) { in.foreign_writer = true; });
+      robot.input.foreign_writer = false;
+      for (int k = 0; k < 1000; ++k) robot.tick(fault.spoil);
+      if (robot.memory.state < SafetyState::kDamp) continue;
+      damp.insert(std::string(stop_cause_name(robot.memory.cause)));
+    }
+  }
+  EXPECT_EQ(damp, (std::set<std::string>{"state_age", "tilt", "motor_error", "stop_key", "lost_writer"}));
+}
+
+TEST(SafetyMachine, AHoldEndsWhenAllIsWellAndTheOperatorAsksAnew) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.input.run = true;
+  robot.tick([](SafetyInput& in) { in.foreign_writer = true; });
+  robot.run_for(1.0);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold) << "another writes";
+  robot.input.foreign_writer = false;
+  robot.run_for(30.0);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold) << "the key was held all the time";
+  robot.input.run = false;
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  robot.input.run = true;
+  robot.tick([](SafetyInput& in) { in.dead_man_at = in.now - 1.0; });
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold) << "nobody holds the dead-man switch";
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kRun);
+}
+
+TEST(SafetyMachine, APlannersHoldWithAnotherFaultDoesNotEndByItself) {
   SimulatedSafety robot = in_state(SafetyState::kRun);
   robot.run_for(0.7, cut(&SafetyInput::planner_at));
   robot.tick([](SafetyInput& in) {
@@ -203,31 +226,60 @@ TEST(SafetyMachine, APlannersHoldWithAnotherFaultDoesNotEndInRunning) {
     in.health.tilt = 0.6;
   });
   robot.input.health.tilt = 0.0;
-  robot.tick();
-  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  robot.run_for(1.0);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
   EXPECT_EQ(robot.memory.cause, StopCause::kTilt);
 }
 
-TEST(SafetyMachine, AHoldOpensTheArmsAndWaitsForThemBeforeItDamps) {
-  SimulatedSafety robot = in_state(SafetyState::kRun);
-  robot.input.hands_clear = false;
+TEST(SafetyMachine, AHoldBeforeItStoodEndsInStandingUp) {
+  SimulatedSafety robot = in_state(SafetyState::kStand);
+  robot.input.stands = false;
   robot.input.foreign_writer = true;
-  robot.run_for(3.0);
-  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
-  EXPECT_TRUE(robot.order().opens);
-  robot.input.hands_clear = true;
   robot.tick();
-  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
-  EXPECT_EQ(robot.memory.cause, StopCause::kForeignWriter);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  robot.input.stand = robot.input.run = true;
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold) << "another writes";
+  robot.input.foreign_writer = robot.input.stand = false;
+  robot.run_for(1.0);
+  robot.input.run = false;
+  robot.tick();
+  robot.input.run = true;
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold) << "it does not stand";
+  robot.input.stand = true;
+  robot.tick([](SafetyInput& in) { in.planner_at = in.dead_man_at = kNever; });
+  EXPECT_EQ(robot.memory.state, SafetyState::kStand);
 }
 
-TEST(SafetyMachine, WhatDampsDoesNotWaitForTheArms) {
-  SimulatedSafety robot = in_state(SafetyState::kRun);
-  robot.input.hands_clear = false;
-  robot.input.foreign_writer = true;
-  robot.tick();
-  robot.tick([](SafetyInput& in) { in.stop_key = true; });
-  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+TEST(SafetyMachine, StandingUpNeedsTheDeadManSwitchAndAKnownPerson) {
+  SimulatedSafety robot = in_state(SafetyState::kStand);
+  EXPECT_EQ(robot.order().share, 1.0);
+  for (const auto& [at, cause] : {std::pair(&SafetyInput::dead_man_at, StopCause::kDeadMan),
+                                  std::pair(&SafetyInput::person_at, StopCause::kPersonAge)}) {
+    robot.tick([at = at](SafetyInput& in) { in.*at = in.now - 0.3; });
+    EXPECT_EQ(robot.order().share, 0.0);
+    EXPECT_EQ(stand_waits_for(robot.rules, robot.input), cause);
+    EXPECT_EQ(robot.memory.state, SafetyState::kStand);
+    EXPECT_TRUE(robot.order().stands);
+  }
+  robot.rules.person_present = false;
+  EXPECT_EQ(stand_waits_for(robot.rules, robot.input), StopCause::kNone);
+}
+
+TEST(SafetyMachine, ChargeAndHeatKeepItFromBeingArmedBeforeTheyHold) {
+  for (const auto& spoil : {Spoil([](SafetyInput& in) { in.health.charge = 29.0; }),
+                            Spoil([](SafetyInput& in) { in.health.casing = 76.0; }),
+                            Spoil([](SafetyInput& in) { in.health.winding = 101.0; })}) {
+    SimulatedSafety robot = in_state(SafetyState::kListen);
+    robot.run_for(3.0, spoil);
+    EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+    EXPECT_TRUE(robot.memory.missing == "charge" || robot.memory.missing == "temperature") << robot.memory.missing;
+    robot = in_state(SafetyState::kRun);
+    robot.run_for(3.0, spoil);
+    EXPECT_EQ(robot.memory.state, SafetyState::kRun);
+    EXPECT_EQ(assess(robot.rules, robot.input, {}, robot.memory.last_now, true).level, StopLevel::kWarn);
+  }
 }
 
 TEST(SafetyMachine, DampingLastsFiveSecondsAndThenLatches) {
@@ -250,8 +302,10 @@ TEST(SafetyMachine, AfterTheStopKeyItMayBeArmedAnew) {
   robot.input.stop_key = false;
   robot.run_for(5.1);
   EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+  EXPECT_TRUE(robot.order().writes && robot.order().damps) << "a robot that was armed is never without commands";
   robot.run_for(2.1);
   EXPECT_EQ(robot.memory.state, SafetyState::kReady);
+  EXPECT_TRUE(robot.order().writes && robot.order().damps);
 }
 
 TEST(SafetyMachine, AFaultWhileTheOperatorsStopDampsLatches) {
@@ -271,7 +325,8 @@ TEST(SafetyMachine, EveryStateMeetsEveryFault) {
       SimulatedSafety robot = in_state(state);
       for (int k = 0; k < 1000; ++k) robot.tick(fault.spoil);
       EXPECT_NE(robot.memory.state, SafetyState::kRun) << safety_state_name(state) << ", " << fault.name;
-      EXPECT_EQ(robot.order().share, 0.0) << safety_state_name(state) << ", " << fault.name;
+      EXPECT_TRUE(robot.order().share == 0.0 || robot.memory.state == SafetyState::kStand)
+          << safety_state_name(state) << ", " << fault.name;
       if (state <= SafetyState::kReady) {
         EXPECT_FALSE(robot.order().writes) << safety_state_name(state) << ", " << fault.name;
       }
@@ -307,8 +362,10 @@ TEST(SafetyMachine, RandomEventsBreakNoRule) {
       robot.tick(random.chance(0.001) ? fault.spoil : Spoil());
       const SafetyOrder order = robot.order();
       armed = armed || (before == SafetyState::kReady && robot.memory.state == SafetyState::kArmed);
-      ASSERT_TRUE(order.share == 0.0 || robot.memory.state == SafetyState::kRun);
-      ASSERT_TRUE(!order.writes || armed);
+      ASSERT_TRUE(order.share == 0.0 || robot.memory.state == SafetyState::kRun || order.stands);
+      ASSERT_EQ(order.writes, armed);
+      ASSERT_TRUE(!order.writes || order.damps || order.stands || robot.memory.state == SafetyState::kRun ||
+                  robot.memory.state == SafetyState::kHold);
       ASSERT_FALSE(order.damps && order.share > 0.0);
       ASSERT_TRUE(before != SafetyState::kFault || robot.memory.state == SafetyState::kFault);
     }

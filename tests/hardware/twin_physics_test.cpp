@@ -182,8 +182,9 @@ TEST(TwinOperator, StandsItUpLetsItDownAndAsksItToRun) {
   EXPECT_EQ(twin.physics()->hanging(), 0.0);
   EXPECT_TRUE(go_on(1.0, RemoteKey::kA));
   twin.obey(damping);
-  EXPECT_FALSE(go_on(0.1, RemoteKey::kA));
-  EXPECT_EQ(twin.physics()->hanging(), 1.0);
+  go_on(2.0, RemoteKey::kA);
+  EXPECT_EQ(twin.physics()->hanging(), 0.0) << "nobody hangs it back on its rope";
+  EXPECT_TRUE(has_fallen(twin.physics()->state(), test::g1()->fall)) << "damped, it falls";
 }
 
 }  // namespace
