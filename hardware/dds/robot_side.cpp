@@ -49,15 +49,15 @@ void RobotSide::make_executor(const RobotConfig& config, const RobotSideOptions&
     sport_ = open_sport_wire(config.place());
     executor_ = std::make_unique<SportExecutor>(*sport_, options.period);
   } else {
-    require(!options.commands || options.velocity_port > 0,
+    require(!options.commands || kind == ExecutorKind::kLowcmd || options.velocity_port > 0,
             "executor 'twin': expected a port that takes its velocities (--velocity-port), found none");
-    if (options.commands)
+    if (options.commands && options.velocity_port > 0)
       velocity_ =
           std::make_unique<LcmVelocity>(DatagramSocket::to_port(static_cast<std::uint16_t>(options.velocity_port)));
     else
       velocity_ = std::make_unique<NoVelocity>();
     const int expected = options.commands ? 0 : expected_writers(config.executor);
-    executor_ = std::make_unique<TwinExecutor>(*wire_, *velocity_, expected);
+    executor_ = std::make_unique<MotorExecutor>(*wire_, *velocity_, expected);
   }
 }
 

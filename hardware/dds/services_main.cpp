@@ -21,6 +21,7 @@ namespace {
 using namespace duet;  // a program of its own
 
 constexpr int kPeriodUs = 5000;  // of its commands, as HOMIE's controller has it
+constexpr int kPolicyEvery = 4;  // of these periods, as its policy has it
 volatile std::sig_atomic_t services_stopped = 0;
 
 struct ServicesArguments {
@@ -80,9 +81,12 @@ void play_homie(const ServicesArguments& arguments) {
   LcmChannel channel(arguments.lcm);
   FakeHomie homie;
   std::uint32_t sequence = 0;
+  long periods = 0;
   every_period(arguments, [&](double now) {
     LcmBuffer buffer;
     bool own = false;
+    if (periods++ % kPolicyEvery == 0)
+      (void)channel.send(std::span<const std::byte>(buffer).first(FakeHomie::write_targets(now, sequence++, buffer)));
     while (const std::size_t size = channel.receive(buffer, own))
       if (!own) homie.receive(std::span<const std::byte>(buffer).first(size), now);
     if (!motors.listen()) return;

@@ -31,14 +31,17 @@ ExecutorKind executor_kind(const std::string& name) {
       fmt::format("executor: expected {}, found '{}'", fmt::join(kExecutorNames, ", "), excerpt(name)));
 }
 
-ExecutedChannels executed_channels(ExecutorKind kind, const RobotModel& robot, const std::vector<int>& joints) {
+ExecutedChannels executed_channels(ExecutorKind kind, const RobotModel& robot, const std::vector<int>& joints,
+                                   const std::string& walker) {
   ExecutedChannels channels;
   channels.kind = kind;
   channels.joints = joints;
-  channels.homie = channels.height = kind == ExecutorKind::kHomieLcm;
+  channels.homie = channels.height = kind == ExecutorKind::kHomieLcm || walker == "homie";
   switch (kind) {
     case ExecutorKind::kTwin:
-      channels.legs = "keep the stance of the guard";
+    case ExecutorKind::kLowcmd:
+      channels.legs =
+          walker.empty() ? "keep the stance of the guard" : fmt::format("by the controller '{}' in the guard", walker);
       channels.stop = "damps every joint";
       break;
     case ExecutorKind::kHomieLcm:
@@ -79,15 +82,29 @@ std::string executed_channels_text(const ExecutedChannels& channels, const Robot
 }
 
 std::string executor_refusal(ExecutorKind kind, OdometrySource odometry, bool twin) {
-  if (!twin && kind == ExecutorKind::kTwin) return "executor 'twin' is a twin's: a robot has 'homie-lcm' or 'sport'";
+  if (!twin && kind == ExecutorKind::kTwin)
+    return "executor 'twin' is a twin's: a robot has 'lowcmd', 'homie-lcm' or 'sport'";
   if (odometry == OdometrySource::kNone)
     return "no source of odometry: expected one of legs, external, vendor; without measured odometry nothing walks "
            "(supplement A.4.3)";
   if (!twin && odometry == OdometrySource::kTwin)
     return "odometry 'twin' is a twin's: a robot has 'legs', 'external' or 'vendor'";
-  if (kind == ExecutorKind::kHomieLcm && odometry == OdometrySource::kVendor)
-    return "odometry 'vendor' is there only while the maker's own walking runs: executor 'homie-lcm' needs 'legs' or "
-           "'external'";
+  const bool own = kind == ExecutorKind::kHomieLcm || kind == ExecutorKind::kLowcmd;
+  if (own && odometry == OdometrySource::kVendor)
+    return fmt::format(
+        "odometry 'vendor' is there only while the maker's own walking runs: executor '{}' needs 'legs' or 'external'",
+        executor_name(kind));
+  return "";
+}
+
+std::string walker_refusal(ExecutorKind kind, const std::string& walker, bool told) {
+  if (kind == ExecutorKind::kLowcmd && !told)
+    return fmt::format(
+        "executor 'lowcmd' commands every motor: expected a controller that is told velocities and keeps the robot on "
+        "its feet (--walker homie), found {}",
+        walker.empty() ? "none" : fmt::format("'{}'", walker));
+  if (!walker.empty() && (kind == ExecutorKind::kHomieLcm || kind == ExecutorKind::kSport))
+    return fmt::format("executor '{}' walks by itself: expected no --walker, found '{}'", executor_name(kind), walker);
   return "";
 }
 

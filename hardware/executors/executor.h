@@ -19,15 +19,16 @@ enum class ExecutorKind {
   kTwin,      // the guard's own frames to a twin
   kHomieLcm,  // HOMIE's processes, over LCM
   kSport,     // the maker's walking, over DDS: not HOMIE
+  kLowcmd,    // the guard's own frames to a robot; a walking controller in the guard keeps it on its feet
 };
-inline constexpr std::array<std::string_view, 3> kExecutorNames = {"twin", "homie-lcm", "sport"};
+inline constexpr std::array<std::string_view, 4> kExecutorNames = {"twin", "homie-lcm", "sport", "lowcmd"};
 std::string_view executor_name(ExecutorKind kind);
 // Throws std::invalid_argument with the known names.
 ExecutorKind executor_kind(const std::string& name);
 
 struct ExecutedChannels {
   ExecutorKind kind = ExecutorKind::kTwin;
-  std::string_view legs;       // who moves them
+  std::string legs;            // who moves them
   std::string_view stop;       // what a damping of the guard does, for the operator
   bool homie = false;          // its walking is HOMIE's
   bool height = false;         // of the pelvis, as told
@@ -35,14 +36,17 @@ struct ExecutedChannels {
   std::vector<bool> executed;  // of the reference: x, y, z, quaternion w, x, y, z, then the joints of the card. x, y
                                // and the turn are executed as a velocity.
 };
-// `joints`: those that a limiter lets through (ExecutedJoints).
-ExecutedChannels executed_channels(ExecutorKind kind, const RobotModel& robot, const std::vector<int>& joints);
+// `joints`: those that a limiter lets through (ExecutedJoints). `walker`: the controller in the guard; empty: none.
+ExecutedChannels executed_channels(ExecutorKind kind, const RobotModel& robot, const std::vector<int>& joints,
+                                   const std::string& walker = "");
 nlohmann::json executed_channels_json(const ExecutedChannels& channels, const RobotModel& robot);
 // One sentence for the screen: what is executed and what is not.
 std::string executed_channels_text(const ExecutedChannels& channels, const RobotModel& robot);
 
 // Why this executor with this odometry cannot be a robot's, or a twin's; empty where it can.
 std::string executor_refusal(ExecutorKind kind, OdometrySource odometry, bool twin);
+// Why the guard cannot walk with this controller and executor; empty where it can. `told`: it takes velocities.
+std::string walker_refusal(ExecutorKind kind, const std::string& walker, bool told);
 
 // The way of the guard's commands to the robot. Every message is made from the guard's limited frame and velocity. One
 // owner, one thread.

@@ -26,6 +26,7 @@ HomieExecutor::~HomieExecutor() { close(); }
 void HomieExecutor::poll(double now) {
   now_ = now;
   BodyControlData body;
+  PdTargets targets;
   PedalCommand pedal;
   ArmAction arms;
   for (int k = 0; k < kMostDatagrams; ++k) {
@@ -34,14 +35,23 @@ void HomieExecutor::poll(double now) {
     if (size == 0) return;
     const auto datagram = std::span<const std::byte>(buffer_).first(size);
     if (decode(datagram, body).refusal.empty())
-      heard_at_ = now;
+      echoed_at_ = now;
+    else if (decode(datagram, targets).refusal.empty())
+      hear_policy(targets, now);
     else if (!own && (decode(datagram, pedal).refusal.empty() || decode(datagram, arms).refusal.empty()))
       steered_at_ = now;
   }
 }
 
+// A message that comes again is no sign of life.
+void HomieExecutor::hear_policy(const PdTargets& targets, double now) {
+  if (targets.timestamp_us != stamp_) policy_at_ = now;
+  stamp_ = targets.timestamp_us;
+}
+
 std::string HomieExecutor::complaint() const {
-  if (heard_at_ == kNever) return "HOMIE's controller has not been heard (LCM channel 'body_control_data')";
+  if (echoed_at_ == kNever) return "HOMIE's controller has not been heard (LCM channel 'body_control_data')";
+  if (!(now_ - policy_at_ < kHomieAges.hold)) return "HOMIE's policy is not heard (LCM channel 'pd_plustau_targets')";
   if (now_ - steered_at_ < kSteeredFor) return "somebody else steers HOMIE ('pedal_command' or 'arm_action')";
   if (writers_ != 1) return fmt::format("expected one writer of commands, HOMIE's controller, found {}", writers_);
   return "";

@@ -7,6 +7,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/hardware/executors/homie_executor.h"
 #include "duet/robots/human_body.h"
 #include "duet/robots/yaml_schema.h"
 
@@ -28,6 +29,16 @@ namespace {
 constexpr const char* kRobotSchema = "duet.robot/1";
 // Gains of arms beside a person: the maker's example for its arm topic.
 constexpr double kArmStiffness = 60.0, kArmDamping = 1.5;
+
+// HOMIE's controller drives the arms with its own.
+void take_homies_gains(ExecutedJoints& executed, const RobotModel& robot) {
+  for (const std::vector<int>& arm : robot.roles.arms)
+    for (std::size_t k = 0; k < arm.size(); ++k) {
+      executed.kp[arm[k]] = kHomieArmStiffness.at(k);
+      executed.kd[arm[k]] = kHomieArmDamping.at(k);
+    }
+  executed.fixed_gains = true;
+}
 
 // Bones of an adult of 1.75 m, where nobody measured: pelvis to head, legs and arms [m].
 constexpr std::array<double, 24> kAdultBones = {0.12, 0.11, 0.11,  0.12,  0.40, 0.40, 0.13,  0.42,
@@ -125,6 +136,10 @@ GuardSetup guard_setup(const RobotConfig& config, bool dry_run) {
     limiter.executed.joints.insert(limiter.executed.joints.end(), arm.begin(), arm.end());
   limiter.executed.kp.setConstant(limiter.robot->dof(), kArmStiffness);
   limiter.executed.kd.setConstant(limiter.robot->dof(), kArmDamping);
+  if (config.executor == ExecutorKind::kHomieLcm) {
+    take_homies_gains(limiter.executed, *limiter.robot);
+    setup.rules.executor = kHomieAges;
+  }
   limiter.person = config.person;
   limiter.human = make_human_body(kAdultBones);
   limiter.contact_limits =
@@ -136,7 +151,8 @@ GuardSetup guard_setup(const RobotConfig& config, bool dry_run) {
   setup.has_battery = true;
   setup.executor = config.executor;
   setup.odometry = config.odometry;
-  setup.rules.executor_answers = !dry_run && config.executor != ExecutorKind::kTwin;
+  const bool answers = config.executor == ExecutorKind::kHomieLcm || config.executor == ExecutorKind::kSport;
+  setup.rules.executor_answers = !dry_run && answers;
   return setup;
 }
 

@@ -15,11 +15,11 @@
 
 namespace duet {
 
-// The guard's own frames to a twin, and velocities as HOMIE's message to a port beside it.
-class TwinExecutor final : public Executor {
+// The guard's own frames to the motors: a twin's, with velocities as HOMIE's message to a port beside it, or a robot's.
+class MotorExecutor final : public Executor {
  public:
   // `expected_writers`: of commands, of whom it is known; where nothing is commanded at all.
-  TwinExecutor(RobotWire& wire, VelocitySink& velocity, int expected_writers = 0)
+  MotorExecutor(RobotWire& wire, VelocitySink& velocity, int expected_writers = 0)
       : wire_(wire), velocity_(velocity), expected_writers_(expected_writers) {}
 
   void poll(double) override {}

@@ -24,6 +24,7 @@ struct GuardSetup {
   JointCommand stance;   // of the joints that the limiter does not move: targets and gains
   bool dry_run = true;
   ExecutorKind executor = ExecutorKind::kTwin;      // for the log
+  std::string walker = {};                          // the controller in the guard; for the log
   OdometrySource odometry = OdometrySource::kTwin;  // for the log
   bool has_battery = false;                         // its charge is reported, and an unknown one holds
 };

@@ -29,6 +29,10 @@ double least_step_speed(const std::string& controller) {
   return descriptor.command ? descriptor.command->forward.steps_from : 0.0;
 }
 
+bool is_told_velocities(const std::string& controller) {
+  return !controller.empty() && has_descriptor(controller) && load_descriptor(controller).command.has_value();
+}
+
 Walker::Walker(const std::string& controller, const ControllerOptions& options, std::shared_ptr<const RobotModel> robot)
     : Walker(std::move(*load(controller, options, robot)())) {}
 
@@ -38,7 +42,7 @@ std::function<std::unique_ptr<Walker>()> Walker::load(const std::string& control
   require(info.walks, "walker: expected a controller that walks, found '{}'", controller);
   check_controller_options(info, options);
   const double steps_from = least_step_speed(controller);
-  if (has_descriptor(controller) && load_descriptor(controller).command) {
+  if (is_told_velocities(controller)) {
     return [=, make = load_told(controller, robot, options).make] {
       auto told = std::make_shared<VelocityCommand>();
       return std::unique_ptr<Walker>(

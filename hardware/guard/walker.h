@@ -18,6 +18,8 @@ namespace duet {
 
 // The least forward speed that a controller answers by a step, as its descriptor says it; 0 where it has none [m/s].
 double least_step_speed(const std::string& controller);
+// Whether a controller is told velocities, as its descriptor says it.
+bool is_told_velocities(const std::string& controller);
 
 class Walker {
  public:

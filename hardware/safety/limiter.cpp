@@ -114,6 +114,7 @@ void Limiter::tick(const MotionCommand* received, const LimiterInput& input, Lim
   move_root(state, counts);
   move_joints(input, state, counts);
   avoid_bodies(input, before_, gaps, state, counts);
+  if (setup_.executed.fixed_gains) give_way(input, state, counts);
   write(input, state, out, counts);
 }
 
@@ -223,16 +224,30 @@ void Limiter::move_root(LimiterState& state, ClampCounts& counts) const {
   count_if(clamps.value || clamps.rate || clamps.rate_change, counts, ClampReason::kHeight);
 }
 
-// The angle from which the gains ask for no more than their share of the joint's effort.
-double Limiter::lead_target(int joint, const LimiterInput& input, ClampCounts& counts) const {
+// The angle nearest to `target` from which the gains ask for no more than their share of the joint's effort.
+double Limiter::within_torque(int joint, const LimiterInput& input, double target) const {
   const double kp = setup_.executed.kp[joint];
-  if (kp <= 0.0) return wanted_.q[joint];
+  if (kp <= 0.0) return target;
   const double most = setup_.limits.torque_share * setup_.robot->joints[joint].effort;
   const double damping = setup_.executed.kd[joint] * input.state.v[joint];
   const double q = input.state.q[joint];
-  const double target = std::clamp(wanted_.q[joint], q + (damping - most) / kp, q + (damping + most) / kp);
+  return std::clamp(target, q + (damping - most) / kp, q + (damping + most) / kp);
+}
+
+double Limiter::lead_target(int joint, const LimiterInput& input, ClampCounts& counts) const {
+  const double target = within_torque(joint, input, wanted_.q[joint]);
   count_if(target != wanted_.q[joint], counts, ClampReason::kJointLead);
   return target;
+}
+
+// An arm that is pushed away faster than its target may follow is followed all the same where the gains cannot fall.
+void Limiter::give_way(const LimiterInput& input, LimiterState& state, ClampCounts& counts) const {
+  for (const int joint : setup_.executed.joints) {
+    const double given = within_torque(joint, input, state.joints[joint].value);
+    if (std::abs(given - state.joints[joint].value) <= kNearer) continue;
+    state.joints[joint] = {std::clamp(given, joint_bounds_[joint].lower, joint_bounds_[joint].upper), 0.0};
+    count(counts, ClampReason::kJointTorque);
+  }
 }
 
 void Limiter::move_joints(const LimiterInput& input, LimiterState& state, ClampCounts& counts) {
@@ -301,7 +316,8 @@ void Limiter::write(const LimiterInput& input, const LimiterState& state, Limite
     const double kp = setup_.executed.kp[joint], kd = setup_.executed.kd[joint];
     const double most = setup_.limits.torque_share * setup_.robot->joints[joint].effort;
     const double asked = std::abs(kp * (out.q[joint] - input.state.q[joint]) - kd * input.state.v[joint]);
-    const double gain = asked > most + kTorqueRounding ? most / asked : 1.0;
+    const bool lowers = !setup_.executed.fixed_gains && asked > most + kTorqueRounding;
+    const double gain = lowers ? most / asked : 1.0;
     count_if(gain < 1.0, counts, ClampReason::kJointTorque);
     out.kp[joint] = gain * kp;
     out.kd[joint] = gain * kd;

@@ -80,8 +80,9 @@ struct MotionCommand {
 
 // The joints that an executor moves, by the card's order.
 struct ExecutedJoints {
-  std::vector<int> joints;  // ascending
-  Eigen::VectorXd kp, kd;   // of all joints, those it holds [N m/rad], [N m s/rad]
+  std::vector<int> joints;   // ascending
+  Eigen::VectorXd kp, kd;    // of all joints, those it holds [N m/rad], [N m s/rad]
+  bool fixed_gains = false;  // it keeps these whatever is sent: where they would be lowered the target gives way
 };
 
 struct LimiterSetup {
@@ -165,6 +166,8 @@ class Limiter {
   void avoid_bodies(const LimiterInput& input, const std::vector<AxisState>& before, const BodyGaps& gaps,
                     LimiterState& state, ClampCounts& counts);
   [[nodiscard]] double lead_target(int joint, const LimiterInput& input, ClampCounts& counts) const;
+  [[nodiscard]] double within_torque(int joint, const LimiterInput& input, double target) const;
+  void give_way(const LimiterInput& input, LimiterState& state, ClampCounts& counts) const;
   void write(const LimiterInput& input, const LimiterState& state, LimitedCommand& out, ClampCounts& counts) const;
   const BodyGaps& gaps_at_rest(const LimiterInput& input, const std::vector<AxisState>& joints);
   [[nodiscard]] double allowed_speed(double distance, double person_speed) const;

@@ -90,6 +90,7 @@ LimiterSetup setup_of(const Json& json, const std::string& name) {
   setup.executed.joints = json.at("joints").get<std::vector<int>>();
   setup.executed.kp = vector_of(json.at("kp"));
   setup.executed.kd = vector_of(json.at("kd"));
+  setup.executed.fixed_gains = json.at("fixed_gains");
   setup.dt = json.at("dt");
   setup.person = json.at("person");
   setup.human = human_of(json.at("human"), name);
@@ -110,6 +111,7 @@ Json limiter_setup_json(const LimiterSetup& setup) {
           {"joints", setup.executed.joints},
           {"kp", numbers(setup.executed.kp)},
           {"kd", numbers(setup.executed.kd)},
+          {"fixed_gains", setup.executed.fixed_gains},
           {"dt", setup.dt},
           {"person", setup.person},
           {"human", human_json(setup.human)},

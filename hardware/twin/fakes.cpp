@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "duet/core/require.h"
+#include "duet/hardware/executors/homie_executor.h"
 #include "duet/hardware/wire/low_level_frame.h"
 
 namespace duet {
@@ -15,7 +16,6 @@ constexpr double kLegPose[6] = {-0.1, 0.0, 0.0, 0.3, -0.2, 0.0};
 // Its gains: a leg, the waist, an arm.
 constexpr double kLegStiffness[6] = {150, 150, 150, 300, 40, 40}, kLegDamping[6] = {2, 2, 2, 4, 2, 2};
 constexpr double kWaistStiffness = 300, kWaistDamping = 5;
-constexpr double kArmGains[7] = {150, 150, 150, 100, 10, 10, 5}, kArmDampings[7] = {4, 4, 4, 1, 0.5, 0.5, 0.5};
 
 // The name behind magic and sequence number; empty where there is none.
 std::string_view channel_of(std::span<const std::byte> datagram) {
@@ -40,8 +40,9 @@ JointCommand homie_command() {
     command.kd[j] = kWaistDamping;
   }
   for (int j = kFirstArm; j < kG1Motors; ++j) {
-    command.kp[j] = kArmGains[(j - kFirstArm) % 7];
-    command.kd[j] = kArmDampings[(j - kFirstArm) % 7];
+    const auto of_arm = static_cast<std::size_t>((j - kFirstArm) % 7);
+    command.kp[j] = kHomieArmStiffness[of_arm];
+    command.kd[j] = kHomieArmDamping[of_arm];
   }
   return command;
 }
@@ -78,6 +79,13 @@ void FakeHomie::write_command(std::uint8_t mode_machine, LowCommandFrame& frame)
   if (arms_)
     for (int j = 0; j < kLcmArmJoints; ++j) joints_.q_target[kFirstArm + j] = arms_->act[static_cast<std::size_t>(j)];
   build_command(joints_, mode_machine, frame);
+}
+
+std::size_t FakeHomie::write_targets(double now, std::uint32_t sequence, LcmBuffer& buffer) {
+  PdTargets targets;
+  for (std::size_t j = 0; j < 12; ++j) targets.q_des[j] = kLegPose[j % 6];
+  targets.timestamp_us = static_cast<std::int64_t>(1e6 * now);
+  return encode(targets, sequence, buffer);
 }
 
 std::size_t FakeHomie::write_echo(const RobotReading& reading, std::uint32_t sequence, LcmBuffer& buffer) {

@@ -30,6 +30,8 @@ class FakeHomie {
   void receive(std::span<const std::byte> datagram, double now);
   // The command that its controller writes 200 times a second. Before any arm target the arms go to 0.
   void write_command(std::uint8_t mode_machine, LowCommandFrame& frame);
+  // Writes what HOMIE's policy sends to its controller 50 times a second; returns the datagram's length.
+  static std::size_t write_targets(double now, std::uint32_t sequence, LcmBuffer& buffer);
   // Writes what HOMIE's controller echoes; returns the datagram's length.
   static std::size_t write_echo(const RobotReading& reading, std::uint32_t sequence, LcmBuffer& buffer);
 

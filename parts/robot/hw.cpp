@@ -187,7 +187,8 @@ class ArmedRun {
 
 std::string executed_text(const RobotConfig& config, const GuardSetup& setup) {
   const RobotModel& robot = *setup.limiter.robot;
-  return executed_channels_text(executed_channels(config.executor, robot, setup.limiter.executed.joints), robot);
+  return executed_channels_text(executed_channels(config.executor, robot, setup.limiter.executed.joints, setup.walker),
+                                robot);
 }
 
 // Null where none is asked for.
@@ -200,7 +201,11 @@ std::unique_ptr<Walker> walker_for(const HardwareArguments& arguments, const Gua
 
 void run_arm(Session& session, const HardwareArguments& arguments) {
   const RobotConfig config = read_robot_config(arguments.config);
-  const GuardSetup setup = guard_setup(config, false);
+  GuardSetup setup = guard_setup(config, false);
+  setup.walker = arguments.walker;
+  const std::string refusal = walker_refusal(config.executor, arguments.walker, is_told_velocities(arguments.walker));
+  if (!refusal.empty()) throw InputError("not armed: " + refusal);
+  const std::unique_ptr<Walker> walker = walker_for(arguments, setup);
   RunLog log(arguments.log, setup);
   ArmingFacts facts = facts_for(config, setup, arguments, log);
   note(session,
@@ -212,7 +217,7 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   facts.now = monotonic_seconds();
   facts.reported_mode_machine = config.permission.mode_machine;  // not heard yet: asked again when it is
   facts.remote_key_held = true;
-  if (const std::string refusal = arming_refusal(facts); !refusal.empty()) throw InputError("not armed: " + refusal);
+  if (const std::string why = arming_refusal(facts); !why.empty()) throw InputError("not armed: " + why);
   DatagramSocket planner = DatagramSocket::at_path(arguments.socket);
   if (arguments.lock_step)
     ask_for_sharp_timers();
@@ -221,7 +226,6 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   RobotSide side(config, side_options(arguments, true));
   LockStepWire stepped(side.connection());
   RobotGuard guard(setup, arguments.lock_step ? static_cast<RobotWire&>(stepped) : side.connection(), side.executor());
-  const std::unique_ptr<Walker> walker = walker_for(arguments, setup);
   if (walker != nullptr) guard.let_walk(*walker);
   std::optional<PersonInput> person = person_input(config, arguments);
   ArmedRun run(session, guard, side, log, facts);

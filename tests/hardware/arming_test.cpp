@@ -74,6 +74,11 @@ TEST(Arming, OfARobotNeedsContactLimitsThatSomebodySigned) {
 
 TEST(Arming, OfARobotNeedsAnExecutorAndOdometryOfARobot) {
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.executor = ExecutorKind::kTwin; }));
+  EXPECT_EQ(refusal([](ArmingFacts& f) { f.executor = ExecutorKind::kLowcmd; }), "") << "a robot's own motors";
+  EXPECT_SENTENCE(refusal([](ArmingFacts& f) {
+    f.executor = ExecutorKind::kLowcmd;
+    f.odometry = OdometrySource::kVendor;
+  }));
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.odometry = OdometrySource::kTwin; }));
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.odometry = OdometrySource::kNone; }));
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.odometry = OdometrySource::kVendor; }));

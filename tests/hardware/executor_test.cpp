@@ -22,7 +22,8 @@ TEST(Executor, IsKnownByItsName) {
 
 // Expects, of a reference's 36 channels: place and turn as a velocity, height where HOMIE takes it, 14 arm joints.
 TEST(Executor, NamesTheChannelsThatItExecutes) {
-  for (const ExecutorKind kind : {ExecutorKind::kTwin, ExecutorKind::kHomieLcm, ExecutorKind::kSport}) {
+  for (const ExecutorKind kind :
+       {ExecutorKind::kTwin, ExecutorKind::kHomieLcm, ExecutorKind::kSport, ExecutorKind::kLowcmd}) {
     const ExecutedChannels channels = channels_of(kind);
     const bool homie = kind == ExecutorKind::kHomieLcm;
     ASSERT_EQ(channels.executed.size(), 36u);
@@ -32,6 +33,29 @@ TEST(Executor, NamesTheChannelsThatItExecutes) {
     for (int j = 0; j < 15; ++j) EXPECT_FALSE(channels.executed[7 + static_cast<std::size_t>(j)]) << j;
     for (int j = 15; j < 29; ++j) EXPECT_TRUE(channels.executed[7 + static_cast<std::size_t>(j)]) << j;
   }
+}
+
+// The guard and a walking controller in one process: what it walks with is what counts.
+TEST(Executor, LowcmdExecutesWhatItsWalkerDoes) {
+  const auto channels = [](const std::string& walker) {
+    return executed_channels(ExecutorKind::kLowcmd, *test::g1(), test::arms_of(*test::g1()).joints, walker);
+  };
+  EXPECT_TRUE(channels("homie").homie && channels("homie").executed[2]);
+  EXPECT_FALSE(channels("falcon").homie || channels("falcon").executed[2]);
+  EXPECT_SENTENCE(executed_channels_text(channels("homie"), *test::g1()));
+}
+
+TEST(Executor, EveryMotorNeedsAWalkerAndWhoWalksByItselfHasNone) {
+  EXPECT_TRUE(is_told_velocities("homie"));
+  EXPECT_FALSE(is_told_velocities("wbc_sim") || is_told_velocities(""));
+  EXPECT_EQ(walker_refusal(ExecutorKind::kLowcmd, "homie", true), "");
+  EXPECT_EQ(walker_refusal(ExecutorKind::kTwin, "", false), "");
+  EXPECT_EQ(walker_refusal(ExecutorKind::kTwin, "wbc_sim", false), "");
+  EXPECT_EQ(walker_refusal(ExecutorKind::kSport, "", false), "");
+  EXPECT_SENTENCE(walker_refusal(ExecutorKind::kLowcmd, "", false));
+  EXPECT_SENTENCE(walker_refusal(ExecutorKind::kLowcmd, "wbc_sim", false));
+  EXPECT_SENTENCE(walker_refusal(ExecutorKind::kSport, "homie", true));
+  EXPECT_SENTENCE(walker_refusal(ExecutorKind::kHomieLcm, "homie", true));
 }
 
 TEST(Executor, SaysWhatItDoesNotExecuteAndWhatDampingDoes) {
@@ -95,7 +119,7 @@ class SeenOdometry final : public OdometryReader {
 TEST(RobotConnection, PassesEachThingToTheOneWhoseItIs) {
   MemoryWire wire;
   CountedVelocity velocity;
-  TwinExecutor executor(wire, velocity, 1);
+  MotorExecutor executor(wire, velocity, 1);
   SeenOdometry odometry;
   RobotConnection link(wire, executor, &odometry);
   LowStateFrame frame;

@@ -28,7 +28,7 @@ def unless(condition):
     return choice(condition, 'false')
 
 
-LIMITER = 'Limiter.*:LimiterBesideAPerson.*:AxisLimit.*:HardwareLimits.*'
+LIMITER = 'HomieExecutor.*:Limiter.*:LimiterBesideAPerson.*:AxisLimit.*:HardwareLimits.*'
 MACHINE = 'SafetySignals.*:SafetyMachine.*'
 GUARD = 'RobotGuard.*:FaultMatrix.*:FaultSweep.*:Executor.*:RobotConnection.*'
 
@@ -65,8 +65,9 @@ EDITS = {
         ('count of kJointAcceleration', ('count_if(clamps.rate_change, counts, ClampReason::kJointAcceleration)',
                                          'count_if(!REMOVED && clamps.rate_change, counts, ClampReason::kJointAcceleration)')),
         ('clamp kJointLead',
-         choice('std::clamp(wanted_.q[joint], q + (damping - most) / kp, q + (damping + most) / kp)', 'wanted_.q[joint]')),
-        ('clamp kJointTorque', choice('asked > most + kTorqueRounding ? most / asked : 1.0', '1.0')),
+         choice('within_torque(joint, input, wanted_.q[joint])', 'wanted_.q[joint]')),
+        ('clamp kJointTorque', choice('lowers ? most / asked : 1.0', '1.0')),
+        ('clamp kJointTorque by the target', ('if (setup_.executed.fixed_gains) give_way', 'if (!REMOVED && setup_.executed.fixed_gains) give_way')),
         ('clamp kSelfCollision',
          unless('next.self < setup_.limits.self_distance && next.self < gaps.self - kNearer')),
     ],
@@ -159,7 +160,9 @@ EDITS = {
         ('arming: executor of a robot', unless('!twin && kind == ExecutorKind::kTwin')),
         ('arming: a source of odometry', unless('odometry == OdometrySource::kNone')),
         ('arming: odometry of a robot', unless('!twin && odometry == OdometrySource::kTwin')),
-        ('arming: odometry of the executor', unless('kind == ExecutorKind::kHomieLcm && odometry == OdometrySource::kVendor')),
+        ('arming: odometry of the executor', unless('own && odometry == OdometrySource::kVendor')),
+        ('arming: a walker for every motor', unless('kind == ExecutorKind::kLowcmd && !told')),
+        ('arming: no walker for who walks', unless('!walker.empty() && (kind == ExecutorKind::kHomieLcm || kind == ExecutorKind::kSport)')),
     ],
     ('hardware/executors/homie_executor.cpp', 'HomieExecutor*'): [
         ('homie: silent until it is opened', ('if (open_ && ticks_++', 'if ((REMOVED || open_) && ticks_++')),
@@ -167,6 +170,8 @@ EDITS = {
         ('homie: another who steers', ('+ (now_ - steered_at_ < kSteeredFor ? 1 : 0)', '+ (!REMOVED && now_ - steered_at_ < kSteeredFor ? 1 : 0)')),
         ('homie: one writer', choice('std::max(command_writers - 1, 0)', '0')),
         ('homie: no arms before there are any', ('if (has_arms_) (void)channel_', 'if (REMOVED || has_arms_) (void)channel_')),
+        ('homie: its policy is heard', choice('targets.timestamp_us != stamp_', 'true')),
+        ('homie: both are heard', choice('std::min(echoed_at_, policy_at_)', 'echoed_at_')),
         ('homie: damping keeps the arms', ('if (damps) return true;', 'if (!REMOVED && damps) return true;')),
     ],
     ('hardware/executors/sport_executor.cpp', 'SportExecutor*'): [

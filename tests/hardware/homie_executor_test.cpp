@@ -3,8 +3,10 @@
 
 #include <unistd.h>
 
+#include <functional>
 #include <thread>
 
+#include "duet/hardware/guard/robot_connection.h"
 #include "duet/hardware/twin/fakes.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
@@ -105,16 +107,41 @@ TEST(HomieExecutor, SaysGoodbyeWithAVelocityOfNought) {
   EXPECT_EQ(homie.velocity(), (std::array<double, 4>{0.0, 0.0, 0.0, 0.74}));
 }
 
-TEST(HomieExecutor, HearsOfHomieByItsEchoAlone) {
+void send_echo(LcmChannel& robot) {
+  LcmBuffer buffer;
+  robot.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
+}
+
+void send_targets(LcmChannel& robot, double stamp) {
+  LcmBuffer buffer;
+  robot.send(std::span<const std::byte>(buffer).first(FakeHomie::write_targets(stamp, 1, buffer)));
+}
+
+TEST(HomieExecutor, HearsOfHomieByItsEchoAndByWhatItsPolicySends) {
   LcmChannel robot(own_group());
   HomieExecutor executor(own_group(), 0.74, kGuardDt);
   executor.poll(1.0);
   EXPECT_EQ(executor.heard_at(), kNever);
   EXPECT_SENTENCE(executor.complaint());
-  LcmBuffer buffer;
-  robot.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
+  send_echo(robot);
+  executor.poll(1.9);
+  EXPECT_EQ(executor.heard_at(), kNever) << "its policy has not been heard";
+  executor.foreign_writers(1);
+  EXPECT_SENTENCE(executor.complaint());
+  send_targets(robot, 5.0);
+  send_echo(robot);
   executor.poll(2.0);
   EXPECT_EQ(executor.heard_at(), 2.0);
+  send_targets(robot, 5.0);
+  send_echo(robot);
+  executor.poll(2.1);
+  EXPECT_EQ(executor.heard_at(), 2.0) << "the same message again is no sign of life";
+  EXPECT_EQ(executor.complaint(), "");
+  executor.poll(2.13);
+  EXPECT_NE(executor.complaint(), "");
+  send_targets(robot, 5.02);
+  executor.poll(2.2);
+  EXPECT_EQ(executor.heard_at(), 2.1) << "its controller";
   EXPECT_EQ(executor.foreign_writers(1), 0);
   EXPECT_EQ(executor.complaint(), "");
 }
@@ -125,8 +152,8 @@ TEST(HomieExecutor, OneWriterIsHomiesAndMoreAreForeign) {
   EXPECT_EQ(executor.foreign_writers(2), 1);
   EXPECT_EQ(executor.foreign_writers(0), 0);
   LcmChannel robot(own_group());
-  LcmBuffer buffer;
-  robot.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
+  send_echo(robot);
+  send_targets(robot, 1.0);
   executor.poll(1.0);
   EXPECT_SENTENCE(executor.complaint());
 }
@@ -194,9 +221,12 @@ class ThroughHomie final : public FrameTransport {
       const auto& v = homie.velocity();
       twin_.obey(VelocityCommand{v[0], v[1], v[2], v[3]});
       robot_.send(std::span<const std::byte>(buffer).first(FakeHomie::write_echo(RobotReading(), 1, buffer)));
+      if (policy_alive && steps_++ % 10 == 0)
+        robot_.send(std::span<const std::byte>(buffer).first(FakeHomie::write_targets(now, 1, buffer)));
     }
     twin_.step(kGuardDt);
     twin_.write_state(state_);
+    if (spoil) spoil(state_);
     waits_ = true;
     executor_.poll(now);
   }
@@ -213,10 +243,12 @@ class ThroughHomie final : public FrameTransport {
   bool write(const LowCommandFrame& frame) override { return executor_.write(frame); }
   HomieExecutor& executor() { return executor_; }
 
-  bool alive = true;
+  bool alive = true, policy_alive = true;
   FakeHomie homie;
+  std::function<void(LowStateFrame&)> spoil;  // seals it
 
  private:
+  long steps_ = 0;
   TwinModel& twin_;
   LcmChannel robot_;
   HomieExecutor executor_;
@@ -230,9 +262,15 @@ struct HomieRun {
     message.command.root = {0.0, 0.0, 0.0, 0.74};
   }
   static GuardSetup setup() {
+    RobotConfig config;
+    config.twin = true;
+    config.person = false;
+    config.executor = ExecutorKind::kHomieLcm;
+    const GuardSetup configured = guard_setup(config, false);
     GuardSetup setup = test::twin_guard();
-    setup.executor = ExecutorKind::kHomieLcm;
-    setup.rules.executor_answers = true;
+    setup.executor = config.executor;
+    setup.rules = configured.rules;
+    setup.limiter.executed = configured.limiter.executed;
     return setup;
   }
   void tick() {
@@ -294,6 +332,63 @@ TEST(HomieExecutor, IsNotReadyWithoutHomieAndHoldsWhenItDies) {
   run.run_for(0.7);
   EXPECT_EQ(run.state(), SafetyState::kHold);
   EXPECT_EQ(run.guard.status().safety.cause, StopCause::kExecutorAge);
+}
+
+// Its controller lives on, echoes, and keeps the legs where the policy left them.
+TEST(HomieExecutor, ADeadPolicyHoldsWithinTwelveHundredthsOfASecond) {
+  HomieRun run;
+  run.start();
+  run.message.command.root.forward = 0.2;
+  run.run_for(1.0);
+  ASSERT_EQ(run.state(), SafetyState::kRun) << stop_cause_name(run.guard.status().safety.cause);
+  run.wire.policy_alive = false;
+  const double killed_at = run.now;
+  while (run.state() == SafetyState::kRun && run.now - killed_at < 1.0) run.tick();
+  EXPECT_EQ(run.state(), SafetyState::kHold);
+  EXPECT_EQ(run.guard.status().safety.cause, StopCause::kExecutorAge);
+  EXPECT_LE(run.now - killed_at, 0.12 + 1.5 * kGuardDt);
+}
+
+// The torque that HOMIE's own gains ask of the left shoulder's first joint, whatever frame the guard wrote [N m].
+double asked_of_shoulder(HomieRun& run) {
+  LowCommandFrame sent;
+  run.wire.homie.write_command(5, sent);
+  const MotorCommandFrame& motor = sent.motor[15];
+  const RobotState& measured = run.guard.measured();
+  return std::abs(motor.kp * (motor.q - measured.q[15]) - motor.kd * measured.v[15]);
+}
+
+TEST(HomieExecutor, ABlockedOrPushedArmGetsNoMoreThanTheEnvelopesTorque) {
+  HomieRun run;
+  run.start();
+  const RobotJoint& shoulder = test::g1()->joints[15];
+  const double most = HardwareLimits{}.torque_share * shoulder.effort;
+  const auto at = static_cast<float>(run.guard.measured().q[15]);
+  float pushed = 0.0f, speed = 0.0f;
+  run.wire.spoil = [&](LowStateFrame& frame) {
+    frame.motor[15].q = at + pushed;
+    frame.motor[15].dq = speed;
+    frame.motor[15].tau_est = 0.0f;
+    seal(frame);
+  };
+  run.message.command.q[15] = shoulder.lower + 0.1;
+  double largest = 0.0;
+  for (int k = 0; k < 2000; ++k) {
+    run.tick();
+    largest = std::max(largest, asked_of_shoulder(run));
+  }
+  EXPECT_GT(largest, 0.9 * most) << "it presses";
+  EXPECT_LE(largest, most + 1e-3);
+  speed = 0.8f;                                        // somebody pushes it away, faster than a target may move
+  constexpr double kBetweenTargets = 0.02 + kGuardDt;  // HOMIE hears of a target 50 times a second
+  constexpr int kFirst = 20;                           // ticks in which the push begins
+  const double late = kHomieArmStiffness[0] * speed * kBetweenTargets, begins = kHomieArmDamping[0] * speed;
+  for (int k = 0; k < 250; ++k) {
+    pushed += speed * static_cast<float>(kGuardDt);
+    run.tick();
+    EXPECT_LE(asked_of_shoulder(run), most + late + (k < kFirst ? begins : 0.0) + 1e-3) << k;
+  }
+  EXPECT_GT(counted(run.guard.status().clamps, ClampReason::kJointTorque), 0);
 }
 
 TEST(HomieExecutor, ADampedGuardLeavesHomieStandingStill) {

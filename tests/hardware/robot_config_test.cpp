@@ -75,7 +75,7 @@ TEST(RobotConfig, ARobotHasNoOdometryUntilItIsNamed) {
 }
 
 TEST(RobotConfig, OfTheExamplesAreTwins) {
-  for (const char* name : {"homie", "sport", "camera"}) {
+  for (const char* name : {"homie", "sport", "camera", "lowcmd"}) {
     const RobotConfig config = read_robot_config(std::string(DUET_SOURCE_DIR) + "/examples/hardware/" + name + ".yaml");
     EXPECT_TRUE(config.twin) << name;
     EXPECT_EQ(executor_refusal(config.executor, config.odometry, true), "") << name;
