@@ -8,13 +8,13 @@
 #include "duet/core/file.h"
 #include "duet/core/recording.h"
 #include "duet/core/require.h"
+#include "duet/hardware/log/frame_cdr.h"
 #include "duet/hardware/log/run_log.h"
 #include "duet/hardware/safety/limiter_setup_json.h"
 
 namespace duet {
 namespace {
 
-constexpr std::size_t kCdrHeadBytes = 4;
 constexpr int kTicksPerFrame = 10;  // of the guard: 50 Hz
 
 // A tick of the log with what was sent in it.
@@ -70,11 +70,11 @@ class LogReader {
 
   // Takes the command frame of the tick before it in the file.
   void take_frame(std::span<const std::byte> data) {
-    if (data.size() != kCdrHeadBytes + sizeof(LowCommandFrame))
-      throw InputError(fmt::format("{}: expected commands of {} bytes, found {}", path_,
-                                   kCdrHeadBytes + sizeof(LowCommandFrame), data.size()));
-    for (std::vector<LoggedTick>* ticks : latest_)
-      std::memcpy(&ticks->back().sent.emplace(), data.data() + kCdrHeadBytes, sizeof(LowCommandFrame));
+    LowCommandFrame frame;
+    if (!read_cdr(data, frame))
+      throw InputError(fmt::format("{}: expected commands of {} bytes of CDR, found {}", path_,
+                                   kCdrBytes<LowCommandFrame>, data.size()));
+    for (std::vector<LoggedTick>* ticks : latest_) ticks->back().sent = frame;
   }
 
   void take_event(std::span<const std::byte> data) {

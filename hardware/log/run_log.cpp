@@ -12,6 +12,7 @@
 #include "duet/core/json.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
+#include "duet/hardware/log/frame_cdr.h"
 #include "duet/hardware/safety/limiter_setup_json.h"
 
 namespace duet {
@@ -19,7 +20,6 @@ namespace {
 
 constexpr std::size_t kSlots = 4096;  // of the ring: 8 s of ticks
 constexpr std::uint16_t kSetupChannel = 1, kTickChannel = 2, kFrameChannel = 3, kEventChannel = 4, kStateChannel = 5;
-constexpr unsigned char kCdrHead[4] = {0, 1, 0, 0};  // little-endian
 
 const McapChannel kChannels[] = {
     {kSetupChannel, "guard/setup", "json", "", "", ""},
@@ -164,8 +164,9 @@ RunLog::RunLog(const std::string& path, const GuardSetup& setup)
       {"duet", duet_version()},
       {"limiter", limiter_setup_json(limiter)},
       {"odometry", kOdometryNames[static_cast<std::size_t>(setup.odometry)]},
-      {"executor", executed_channels_json(executed_channels(setup.executor, *limiter.robot, limiter.executed.joints),
-                                          *limiter.robot)}};
+      {"executor",
+       executed_channels_json(executed_channels(setup.executor, *limiter.robot, limiter.executed.joints, setup.walker),
+                              *limiter.robot)}};
   const std::string text = dumped(json);
   if (!writer_.write(kSetupChannel, 0, 0, bytes_of_text(text)) || !writer_.flush())
     throw StorageError(fmt::format("cannot write '{}'", path));
@@ -223,8 +224,8 @@ void RunLog::write_slot(const Slot& slot) {
   if (slot.dropped > 0) write_event(time, last_.state, last_.cause, "dropped", slot.dropped);
   last_ = slot;
   writer_.write(kTickChannel, sequence_, time, std::as_bytes(std::span(&slot.tick, 1)));
-  if (slot.took) write_frame(kStateChannel, time, std::as_bytes(std::span(&slot.received, 1)));
-  if (slot.sent) write_frame(kFrameChannel, time, std::as_bytes(std::span(&slot.frame, 1)));
+  if (slot.took) write_frame(kStateChannel, time, cdr_of(slot.received));
+  if (slot.sent) write_frame(kFrameChannel, time, cdr_of(slot.frame));
   if (slot.changed) write_event(time, slot.state, slot.cause);
   if (slot.restarts > 0) write_event(time, slot.state, slot.cause, "restarts", slot.restarts);
 }
@@ -238,10 +239,7 @@ void RunLog::write_event(std::uint64_t time, SafetyState state, StopCause cause,
 }
 
 void RunLog::write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame) {
-  std::array<std::byte, sizeof(kCdrHead) + sizeof(LowStateFrame)> cdr;
-  std::memcpy(cdr.data(), kCdrHead, sizeof(kCdrHead));
-  std::memcpy(cdr.data() + sizeof(kCdrHead), frame.data(), frame.size());
-  writer_.write(channel, sequence_, time, std::span<const std::byte>(cdr).first(sizeof(kCdrHead) + frame.size()));
+  writer_.write(channel, sequence_, time, frame);
 }
 
 LogReplay replay_log(const std::string& path) {

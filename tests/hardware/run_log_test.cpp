@@ -2,10 +2,15 @@
 
 #include <gmock/gmock.h>
 
+#include <cstring>
+#include <map>
+#include <regex>
 #include <set>
+#include <vector>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/hardware/log/frame_cdr.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
@@ -197,7 +202,65 @@ void expect_same_bits(const GuardSetup& setup) {
 
 TEST(RunLog, ReplayedThroughTheLimiterGivesTheSameBits) { expect_same_bits(test::twin_guard()); }
 
-TEST(RunLog, HoldsTheFramesAsTheyWere) {
+// Reads a message by the schema that its log carries and by nothing else, as a viewer of others does: members one after
+// the other, each at a multiple of its own size.
+class SchemaReader {
+ public:
+  explicit SchemaReader(const std::string& schema) {
+    const std::regex structs(R"(struct (\w+) \{ ([^}]*)\})"), members(R"((unsigned long|\w+) (\w+)(?:\[(\d+)\])?;)");
+    for (std::sregex_iterator it(schema.begin(), schema.end(), structs), end; it != end; ++it) {
+      const std::string body = (*it)[2];
+      for (std::sregex_iterator m(body.begin(), body.end(), members); m != end; ++m)
+        structs_[(*it)[1]].push_back({(*m)[1], (*m)[2], (*m)[3].matched ? std::stoi((*m)[3]) : 0});
+    }
+  }
+  // The numbers by their names, "motor_cmd[18].q"; nothing where bytes are missing or left.
+  std::map<std::string, double> read(const std::string& name, std::span<const std::byte> body) {
+    values_.clear();
+    body_ = body;
+    at_ = 0;
+    read_struct(name, "");
+    if (at_ != body.size()) values_.clear();
+    return values_;
+  }
+
+ private:
+  struct Member {
+    std::string type, name;
+    int count;
+  };
+  void read_struct(const std::string& name, const std::string& prefix) {
+    for (const Member& member : structs_.at(name))
+      for (int k = 0; k < std::max(member.count, 1); ++k) {
+        const std::string path = prefix + member.name + (member.count > 0 ? "[" + std::to_string(k) + "]" : "");
+        if (member.type == "octet")
+          values_[path] = number<std::uint8_t>();
+        else if (member.type == "short")
+          values_[path] = number<std::int16_t>();
+        else if (member.type == "float")
+          values_[path] = static_cast<double>(number<float>());
+        else if (member.type == "unsigned long")
+          values_[path] = number<std::uint32_t>();
+        else
+          read_struct(member.type, path + ".");
+      }
+  }
+  template <typename T>
+  T number() {
+    T value{};
+    at_ = (at_ + sizeof(T) - 1) / sizeof(T) * sizeof(T);
+    if (at_ + sizeof(T) <= body_.size()) std::memcpy(&value, body_.data() + at_, sizeof(T));
+    at_ += sizeof(T);
+    return value;
+  }
+
+  std::map<std::string, std::vector<Member>> structs_;
+  std::map<std::string, double> values_;
+  std::span<const std::byte> body_;
+  std::size_t at_ = 0;
+};
+
+TEST(RunLog, HoldsTheFramesAsTheSchemasInItSay) {
   const test::ScratchFolder folder;
   run_and_log(folder / "run.mcap", test::twin_guard());
   long commands = 0, states = 0;
@@ -206,16 +269,49 @@ TEST(RunLog, HoldsTheFramesAsTheyWere) {
     if (channel.message_encoding != "cdr") return;
     EXPECT_EQ(channel.schema_encoding, "omgidl");
     const bool command = channel.topic == "rt/lowcmd";
-    ++(command ? commands : states);
-    EXPECT_EQ(message.data.size(), 4 + (command ? sizeof(LowCommandFrame) : sizeof(LowStateFrame)));
-    if (command) {
-      LowCommandFrame frame;
-      std::memcpy(&frame, message.data.data() + 4, sizeof(frame));
-      EXPECT_EQ(frame.crc, checksum_of(frame));
+    if (++(command ? commands : states) % 250 != 1) return;
+    const std::string type = command ? "LowCmd_" : "LowState_", motor = command ? "motor_cmd[" : "motor_state[";
+    ASSERT_TRUE(channel.schema_name.ends_with(type));
+    std::map<std::string, double> values = SchemaReader(channel.schema).read(type, message.data.subspan(4));
+    ASSERT_FALSE(values.empty()) << "bytes are missing or left";
+    LowCommandFrame sent{};
+    LowStateFrame received{};
+    ASSERT_TRUE(command ? read_cdr(message.data, sent) : read_cdr(message.data, received));
+    EXPECT_EQ(values["crc"], command ? sent.crc : received.crc);
+    EXPECT_EQ(command ? sent.crc : received.crc, command ? checksum_of(sent) : checksum_of(received));
+    for (int j = 0; j < kG1Motors; ++j) {
+      const std::string path = motor + std::to_string(j) + "].";
+      EXPECT_EQ(values[path + "q"], static_cast<double>(command ? sent.motor[j].q : received.motor[j].q)) << path;
+      EXPECT_EQ(values[path + "mode"], command ? sent.motor[j].mode : received.motor[j].mode) << path;
+      if (command) {
+        EXPECT_EQ(values[path + "kp"], static_cast<double>(sent.motor[j].kp)) << path;
+      }
     }
   });
   EXPECT_GT(states, 2500);
   EXPECT_GT(commands, 1500);
+}
+
+TEST(FrameCdr, ReadsWhatItWroteAndRefusesTheRest) {
+  LowStateFrame state{};
+  auto* bytes = reinterpret_cast<unsigned char*>(&state);
+  for (std::size_t k = 0; k < sizeof(state); ++k) bytes[k] = static_cast<unsigned char>(k * 7 + 1);
+  LowStateFrame again;
+  EXPECT_EQ(cdr_of(state).size(), 2092u);  // a head of 4 bytes, and 2088
+  ASSERT_TRUE(read_cdr(cdr_of(state), again));
+  EXPECT_EQ(again.imu.temperature, state.imu.temperature);
+  for (int j = 0; j < kG1Motors; ++j) {
+    EXPECT_EQ(again.motor[j].mode, state.motor[j].mode) << j;
+    EXPECT_EQ(again.motor[j].sensor[1], state.motor[j].sensor[1]) << j;
+  }
+  EXPECT_EQ(again.crc, state.crc);
+  LowCommandFrame command{};
+  auto whole = cdr_of(command);
+  EXPECT_EQ(whole.size(), 1004u);
+  EXPECT_FALSE(read_cdr(std::span<const std::byte>(whole).first(1000), command));
+  EXPECT_FALSE(read_cdr(whole, again));
+  whole[1] = std::byte{0};  // of the other byte order
+  EXPECT_FALSE(read_cdr(whole, command));
 }
 
 TEST(RunLog, BesideAPersonToo) {
