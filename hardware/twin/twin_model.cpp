@@ -127,6 +127,10 @@ void TwinModel::write_imu(ImuFrame& imu) {
   if (angle > 0.0) R = R * Eigen::Quaterniond(Eigen::AngleAxisd(angle, lean / angle));
   const double quat_wxyz[4] = {R.w(), R.x(), R.y(), R.z()};
   for (int k = 0; k < 4; ++k) imu.quaternion[k] = static_cast<float>(quat_wxyz[k]);
+  const Eigen::Vector3d down_B = R.conjugate() * -Eigen::Vector3d::UnitZ();
+  imu.rpy[0] = static_cast<float>(std::atan2(-down_B.y(), -down_B.z()));
+  imu.rpy[1] = static_cast<float>(std::asin(std::clamp(down_B.x(), -1.0, 1.0)));
+  imu.rpy[2] = static_cast<float>(yaw_of(R));
   for (int axis = 0; axis < 3; ++axis) {
     imu.gyroscope[axis] = static_cast<float>(w_WB_B_[axis] + options_.gyro_noise * random_.normal());
     imu.accelerometer[axis] =

@@ -171,7 +171,7 @@ EDITS = {
         ('homie: one writer', choice('std::max(command_writers - 1, 0)', '0')),
         ('homie: no arms before there are any', ('if (has_arms_) (void)channel_', 'if (REMOVED || has_arms_) (void)channel_')),
         ('homie: its policy is heard', choice('targets.timestamp_us != stamp_', 'true')),
-        ('homie: both are heard', choice('std::min(echoed_at_, policy_at_)', 'echoed_at_')),
+        ('homie: both are heard', ('      echoed_at_ = now;\n', '    {\n      echoed_at_ = now;\n      if (REMOVED) policy_at_ = now;\n    }\n')),
         ('homie: damping keeps the arms', ('if (damps) return true;', 'if (!REMOVED && damps) return true;')),
     ],
     ('hardware/executors/sport_executor.cpp', 'SportExecutor*'): [

@@ -61,6 +61,22 @@ TEST(TwinModel, TheSameSeedGivesTheSameFrames) {
   }
 }
 
+// Programs that take gravity from the angles see the same tilt as those that take it from the quaternion.
+TEST(TwinModel, ItsImusAnglesAreThoseOfItsQuaternion) {
+  TwinModel twin(test::g1(), {.tilt_noise = 0.3});
+  twin.obey(VelocityCommand{0.0, 0.0, 0.5, 0.74});
+  for (int k = 0; k < 20; ++k) {
+    for (int step = 0; step < 100; ++step) twin.step(kDt);
+    LowStateFrame frame;
+    twin.write_state(frame);
+    const float* rpy = frame.imu.rpy;
+    const Eigen::Quaterniond R = yaw_rotation(rpy[2]) * Eigen::AngleAxisd(rpy[1], Eigen::Vector3d::UnitY()) *
+                                 Eigen::AngleAxisd(rpy[0], Eigen::Vector3d::UnitX());
+    const float* wxyz = frame.imu.quaternion;
+    EXPECT_LT(R.angularDistance(Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3])), 1e-5) << k;
+  }
+}
+
 TEST(TwinModel, OdometryDrifts) {
   TwinModel twin(test::g1(), {.drift = 0.05});
   for (int k = 0; k < 500; ++k) twin.step(kDt);
