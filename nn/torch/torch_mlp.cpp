@@ -50,6 +50,9 @@ constexpr Function kFunctions[] = {
     {"torch.reciprocal", "Reciprocal", 1},
 };
 
+// Functions of a tensor and a number, which is the operator's `alpha`: what a traced module's code calls.
+constexpr Function kShapedFunctions[] = {{"torch.elu", "Elu", 2}, {"torch.leaky_relu", "LeakyRelu", 2}};
+
 // Functions that change nothing of one row of numbers.
 constexpr std::string_view kUnchanged[] = {"torch.unsqueeze", "torch.squeeze", "torch.detach", "torch.contiguous",
                                            "torch.to",        "torch.clone",   "torch.float",  "torch.dropout",
@@ -272,7 +275,7 @@ class GraphReader {
     const std::string& value = arguments[0].name;
     if (kind == "linear.Linear") return linear(object, path, value);
     for (const Activation& known : kActivations)
-      if (kind == known.module) return activation(known, object, path, value);
+      if (kind == known.module) return activation(known, object, path, value, depth);
     if (kind == "activation.SiLU")
       return add_value(path, "Mul", {value, add_value(path + "/s", "Sigmoid", {value}).name});
     if (kind.starts_with("dropout.")) return arguments[0];
@@ -282,13 +285,20 @@ class GraphReader {
     refuse(fmt::format("'{}' as '{}'", kind, path));
   }
 
-  Value activation(const Activation& known, const TorchNode& object, const std::string& path,
-                   const std::string& value) {
-    const Value made = add_value(path, known.op, {value});
-    if (known.parameter == nullptr) return made;
-    const std::optional<double> number = find_number(object, known.parameter);
-    if (!number) refuse(fmt::format("no line '{} : Final[float] = NUMBER' in the code of '{}'", known.parameter, path));
-    made_.graph.nodes.back().attributes["alpha"] = static_cast<float>(*number);
+  Value activation(const Activation& known, const TorchNode& object, const std::string& path, const std::string& value,
+                   int depth) {
+    if (known.parameter == nullptr) return add_value(path, known.op, {value});
+    if (const std::optional<double> number = find_number(object, known.parameter))
+      return shaped(path, known.op, value, *number);
+    // A module that was traced keeps no number: its code calls the function with it.
+    if (class_source(object.text).find("  def forward(") != std::string::npos)
+      return run(object, path, "forward", {graph_value(value)}, depth);
+    refuse(fmt::format("no line '{} : Final[float] = NUMBER' in the code of '{}'", known.parameter, path));
+  }
+
+  Value shaped(const std::string& name, std::string_view op, const std::string& value, double alpha) {
+    Value made = add_value(name, op, {value});
+    made_.graph.nodes.back().attributes["alpha"] = static_cast<float>(alpha);
     return made;
   }
 
@@ -611,6 +621,11 @@ class GraphReader {
       return {.kind = Value::Kind::kNumber, .number = is_none == (name == "torch.__is__") ? 1.0 : 0.0};
     }
     if (name == "torch.clamp" || name == "torch.clip") return clamped(values, line, frame.path);
+    for (const Function& known : kShapedFunctions)
+      if (name == known.name && values.size() == 2 && values[0].kind == Value::Kind::kGraph &&
+          values[1].kind == Value::Kind::kNumber)
+        return shaped(fmt::format("{}/{}", frame.path, made_.graph.nodes.size()), known.op, values[0].name,
+                      values[1].number);
     for (const Function& known : kFunctions)
       if (name == known.name && known.arguments == static_cast<int>(values.size())) {
         std::vector<std::string> inputs;

@@ -161,6 +161,26 @@ TEST(TorchMlp, EveryActivationIsItsFormula) {
   }
 }
 
+// torch.jit.trace keeps no numbers of a module: they stand in the calls of its code, one call in another.
+TEST(TorchMlp, ATracedActivationIsReadFromItsCode) {
+  const std::tuple<const char*, const char*, std::function<double(double)>> all[] = {
+      {"ELU", "torch.elu(argument_1, 0.5)", half_elu},
+      {"LeakyReLU", "torch.leaky_relu(argument_1, 0.2)", [](double x) { return x > 0.0 ? x : 0.2 * x; }}};
+  for (const auto& [name, code, formula] : all) {
+    Mlp3 file;
+    file.between = activation(name);
+    file.sources["torch/nn/modules/activation.py"] =
+        std::string("class ") + name +
+        "(Module):\n  training : bool\n  def forward(self: A,\n    argument_1: Tensor) -> Tensor:\n    return " + code +
+        "\n";
+    file.forward =
+        "    input = torch.detach(input_1)\n"
+        "    _0 = (getattr(self, \"b/Elu\")).forward((getattr(self, \"a/Gemm\")).forward(input, ), )\n"
+        "    return (getattr(self, \"c/Gemm\")).forward(_0, )\n";
+    expect_near(evaluate(*file.network(), {wave(3)})[0], expected_of(file, formula));
+  }
+}
+
 TEST(TorchMlp, ASequentialWithinAModuleIsRead) {
   Mlp3 file;
   file.sources["torch/nn/modules/container.py"] =
