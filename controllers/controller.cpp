@@ -25,9 +25,13 @@ bool is_finite(const JointCommand& command) {
 class Guard final : public Controller {
  public:
   Guard(std::unique_ptr<Controller> controller, const std::shared_ptr<const RobotModel>& robot)
-      : controller_(std::move(controller)), card_(robot->default_command(robot->neutral)), held_(card_) {}
+      : controller_(std::move(controller)),
+        acts_per_tick_(controller_->acts_per_tick()),
+        card_(robot->default_command(robot->neutral)),
+        held_(card_) {}
 
   [[nodiscard]] std::string_view name() const override { return controller_->name(); }
+  [[nodiscard]] int acts_per_tick() const override { return acts_per_tick_; }
   [[nodiscard]] ControllerFaults faults() const override { return faults_; }
 
   void reset(const RobotState& state) override {
@@ -52,7 +56,7 @@ class Guard final : public Controller {
       held_ = command;
       return;
     }
-    if (!faults_.stopped && ++bad_in_a_row_ > kGuardHeldTicks) begin_stop();
+    if (!faults_.stopped && ++bad_in_a_row_ > kGuardHeldTicks * acts_per_tick_) begin_stop();
     if (faults_.stopped) ramp_down();
     command = held_;
   }
@@ -78,9 +82,10 @@ class Guard final : public Controller {
   }
 
   void ramp_down() {
-    const double share = 1.0 - static_cast<double>(stop_ticks_) / kGuardRampTicks;
+    const int ramp = kGuardRampTicks * acts_per_tick_;
+    const double share = 1.0 - static_cast<double>(stop_ticks_) / ramp;
     held_.kp = std::max(share, 0.0) * card_.kp;
-    stop_ticks_ = std::min(stop_ticks_ + 1, kGuardRampTicks);
+    stop_ticks_ = std::min(stop_ticks_ + 1, ramp);
   }
 
   void check_size(const char* what, const Eigen::VectorXd& q) const {
@@ -90,6 +95,7 @@ class Guard final : public Controller {
   }
 
   std::unique_ptr<Controller> controller_;
+  int acts_per_tick_;
   JointCommand card_;  // the card's gains
   JointCommand held_;  // what stands while nothing better is known
   Eigen::VectorXd measured_;
@@ -104,6 +110,7 @@ class DampedAtMost final : public Controller {
       : controller_(std::move(controller)), most_(std::move(most)) {}
 
   [[nodiscard]] std::string_view name() const override { return controller_->name(); }
+  [[nodiscard]] int acts_per_tick() const override { return controller_->acts_per_tick(); }
   [[nodiscard]] ControllerFaults faults() const override { return controller_->faults(); }
   void reset(const RobotState& state) override { controller_->reset(state); }
   void act(const RobotState& state, const Reference& reference, JointCommand& command) override {

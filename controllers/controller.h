@@ -1,4 +1,5 @@
-// A whole-body controller: 36-D reference and robot state -> joint command, at rate_hz (50). Knows nothing of engines.
+// A whole-body controller: 36-D reference and robot state -> joint command, at 50 Hz or a multiple of it. Knows nothing
+// of engines.
 #pragma once
 
 #include <map>
@@ -22,6 +23,8 @@ class Controller {
   [[nodiscard]] virtual std::string_view name() const = 0;
   // Starts an episode in `state`, which it is to keep upright.
   virtual void reset(const RobotState& state) = 0;
+  // Calls of act() in a control period of 20 ms, evenly spaced, all with the reference of their tick.
+  [[nodiscard]] virtual int acts_per_tick() const { return 1; }
   // Fills `command` (sized by the first call or by RobotModel::default_command). No allocation after the first call.
   virtual void act(const RobotState& state, const Reference& reference, JointCommand& command) = 0;
   [[nodiscard]] virtual ControllerFaults faults() const { return {}; }  // since reset
@@ -51,9 +54,10 @@ inline constexpr int kGuardRampTicks = 25;
 
 // A tick on which the state or the reference is not finite does not reach `controller`. On it, and on one whose command
 // is not finite, the last finite command stands (before the first: the angles measured at reset with the card's gains)
-// for kGuardHeldTicks in a row. After that comes the safe stop, for good: targets at the angles last measured, kp
-// falling to 0 over kGuardRampTicks, the card's kd. reset() clears all of it. Throws std::invalid_argument in act() for
-// a state or a reference of another robot's size, and in reset() for a state that is not finite.
+// for kGuardHeldTicks in a row (as many calls more as it acts in a tick). After that comes the safe stop, for good:
+// targets at the angles last measured, kp falling to 0 over kGuardRampTicks, the card's kd. reset() clears all of it.
+// Throws std::invalid_argument in act() for a state or a reference of another robot's size, and in reset() for a state
+// that is not finite.
 std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
                                          const std::shared_ptr<const RobotModel>& robot);
 

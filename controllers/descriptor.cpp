@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "duet/core/file.h"
@@ -17,6 +18,16 @@ int Descriptor::actions() const {
   for (const DescriptorJoint& joint : joints) count += joint.action ? 1 : 0;
   return count;
 }
+
+std::vector<ActionRange> Descriptor::action_ranges() const {
+  std::vector<ActionRange> ranges;
+  for (const DescriptorJoint& joint : joints)
+    if (joint.action) ranges.push_back(joint.clip.value_or(ActionRange{-action_clip, action_clip}));
+  return ranges;
+}
+
+int Descriptor::ticks_per_act() const { return std::max(1, static_cast<int>(std::lround(kTickRate / rate_hz))); }
+int Descriptor::acts_per_tick() const { return std::max(1, static_cast<int>(std::lround(rate_hz / kTickRate))); }
 
 std::vector<LayoutBlock> Descriptor::layout(const ObservationInput& input) const {
   return observation.blocks(input, widths(), ChannelFormat::kController);
@@ -33,6 +44,7 @@ Descriptor read_descriptor(const std::string& path) { return parse_descriptor(re
 namespace {
 
 constexpr int kMostFrames = 1000;  // of a history; more is a slip of the pen
+constexpr int kMostActs = 10;      // in a tick, and ticks for one of them
 
 int line_of(const YAML::Node& node) { return std::max(node.Mark().line, 0) + 1; }
 
@@ -64,6 +76,17 @@ std::string robot_of(const std::string& given, const std::string& file) {
   return (std::filesystem::path(file).parent_path() / given).lexically_normal().string();
 }
 
+// "clip: 18" is a bound of the size, "clip: [-1, 0.5]" a range.
+void read_clip(const YamlSection& s, DescriptorJoint& joint) {
+  if (!s.has("clip")) return;
+  std::vector<double> bounds;
+  read_value(s, {"clip"}, bounds);
+  if (bounds.size() == 1 && bounds[0] > 0.0) bounds = {-bounds[0], bounds[0]};
+  if (bounds.size() != 2 || bounds[0] >= bounds[1])
+    s.refuse_key("clip", "a number above 0 or [lower, upper]", s.node("clip"));
+  joint.clip = {bounds[0], bounds[1]};
+}
+
 FieldDoc around_words() { return {.name = "around", .choices = {"default", "reference"}}; }
 
 const Schema<DescriptorJoint>& joint_schema() {
@@ -74,6 +97,7 @@ const Schema<DescriptorJoint>& joint_schema() {
                                    required_key({.name = "kd", .range = kNotNegative}, &J::kd),
                                    optional_key({.name = "effort", .range = kPositive}, &J::effort),
                                    optional_key({"action"}, &J::action),
+                                   {"clip", read_clip},
                                    optional_key(around_words(), &J::around_reference)};
   return schema;
 }
@@ -121,18 +145,33 @@ const Schema<VelocityInterface>& command_schema() {
   return schema;
 }
 
+// "standing: zero" or a phase for each of `phases`.
+void read_standing(const YamlSection& s, GaitClock& gait) {
+  if (!s.has("standing")) return;
+  gait.silent = s.node("standing").IsScalar() && s.node("standing").Scalar() == "zero";
+  if (gait.silent)
+    gait.standing.assign(gait.phases.size(), 0.0);
+  else
+    read_value(s, {"standing"}, gait.standing);
+}
+
 void read_gait(const SchemaSection& s, Channel& channel) {
   if (!takes_key(channel.kind, "frequency_hz")) return;
   GaitClock& gait = channel.gait;
   gait.phases = {0.0};
   static const Schema<GaitClock> schema = {
       required_key({.name = "frequency_hz", .range = kPositive}, &GaitClock::frequency_hz),
-      optional_key({"phases"}, &GaitClock::phases), optional_key({"standing"}, &GaitClock::standing),
+      optional_key({"phases"}, &GaitClock::phases),
+      {"standing", read_standing},
+      optional_key({.name = "after_standing", .choices = {"restarts", "runs_on", "pauses"}},
+                   &GaitClock::after_standing),
       optional_key({"stance"}, &GaitClock::stance)};
   for (const SchemaKey<GaitClock>& key : schema) key.read(s, gait);
   if (!gait.standing.empty() && gait.standing.size() != gait.phases.size())
     s.fail_key("standing", fmt::format("expected one number for each of the {} phases, found {}", gait.phases.size(),
                                        gait.standing.size()));
+  if (s.has("after_standing") && gait.standing.empty())
+    s.fail_key("after_standing", "expected the key 'standing' beside it, found none");
   if (gait.stance && (*gait.stance <= 0.0 || *gait.stance >= 1.0))
     s.fail_key("stance", fmt::format("expected a number in (0, 1), found {}", *gait.stance));
 }
@@ -172,9 +211,13 @@ void read_steps(const YamlSection& s, Channel& channel) {
   channel.steps = whole_numbers(s, {.name = "steps", .range = {1.0, kMostFrames}});
 }
 
-void read_rate(const YamlSection& root, Descriptor&) {
-  if (const double rate = root.number("rate_hz"); rate != kTickRate)
-    root.fail_key("rate_hz", fmt::format("expected {}, found {}", kTickRate, rate));
+void read_rate(const YamlSection& root, Descriptor& out) {
+  out.rate_hz = root.number("rate_hz");
+  const double ticks = kTickRate / out.rate_hz, acts = out.rate_hz / kTickRate, most = kMostActs;
+  const auto is_whole = [&](double n) { return n >= 1.0 && n <= most && std::abs(n - std::round(n)) < 1e-9; };
+  if (!is_whole(ticks) && !is_whole(acts))
+    root.fail_key("rate_hz", fmt::format("expected {} divided or multiplied by a whole number up to {}, found {}",
+                                         kTickRate, kMostActs, out.rate_hz));
 }
 
 // Reads one descriptor; its members are the state that the steps share.
@@ -221,7 +264,8 @@ class Reader {
       DescriptorJoint joint;
       joint.around_reference = around_reference_;
       const YamlSection s = read_mapping(file_, node, label("joint", node, "name"), joint_schema(), joint);
-      if (s.has("around") && !joint.action) s.fail_key("around", "expected the key 'action' beside it, found none");
+      for (const char* key : {"around", "clip"})
+        if (s.has(key) && !joint.action) s.fail_key(key, "expected the key 'action' beside it, found none");
       refuse_repeat(s, joint.name);
       out_.joints.push_back(joint);
       joint_names_.push_back(joint.name);
@@ -251,6 +295,7 @@ class Reader {
     const Schema<D> schema = {
         optional_key({"output"}, &D::output),
         optional_key({.name = "clip", .range = kPositive}, &D::action_clip),
+        optional_key({"within_limits"}, &D::within_limits),
         {"around", [this](const YamlSection& s, D&) { read_optional(s, around_words(), around_reference_); }}};
     out_.output_line = read_mapping(file_, root.node("action"), "action", schema, out_).line("output");
   }
@@ -290,6 +335,7 @@ class Reader {
             {"frequency_hz", read_gait},
             {"phases"},
             {"standing"},
+            {"after_standing"},
             {"stance"},
             {"steps", read_steps},
             {"values", read_values}};

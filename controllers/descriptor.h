@@ -9,9 +9,15 @@
 #include <string>
 #include <vector>
 
+#include "duet/core/robot_state.h"
 #include "duet/io/observation.h"
 
 namespace duet {
+
+// Numbers between which an action is taken, before its scale.
+struct ActionRange {
+  double lower = -std::numeric_limits<double>::infinity(), upper = std::numeric_limits<double>::infinity();
+};
 
 // In the network's order.
 struct DescriptorJoint {
@@ -22,7 +28,8 @@ struct DescriptorJoint {
   std::optional<double> effort;  // the target is moved until the torque at the tick is within it [N m]
   // Scale of its output [rad]; none: it is not moved by the network, but by the reference.
   std::optional<double> action;
-  bool around_reference = false;  // its action is added to the reference's angle instead of the default pose
+  std::optional<ActionRange> clip{};  // of its output; none: the one of all actions
+  bool around_reference = false;      // its action is added to the reference's angle instead of the default pose
 };
 
 // A joint that a body may have and the network knows nothing of: it follows the reference.
@@ -41,7 +48,7 @@ struct CommandRange {
 // A controller that is told a velocity, not a pose (controllers/root_conversion.h).
 struct VelocityInterface {
   CommandRange forward, lateral, yaw;  // [m/s], [m/s], [rad/s]
-  CommandRange height;                 // [m]; lower == upper where the controller takes none
+  CommandRange height{};               // [m]; lower == upper where the controller takes none
   double height_offset = 0.0;          // of the pelvis over the commanded height, measured [m]
   // Below it the network is told to stand: it is shown velocities of 0, a command_stand of 0 and clocks that hold.
   std::optional<StandBounds> stands_below{};
@@ -50,8 +57,9 @@ struct VelocityInterface {
 struct Descriptor {
   std::string file;  // where it was read, for messages
   std::string name, about, licence;
-  std::string robot;    // card: a name (robots/robot_cards.h) or a path
-  std::string network;  // file name
+  std::string robot;           // card: a name (robots/robot_cards.h) or a path
+  std::string network;         // file name
+  double rate_hz = kTickRate;  // at which the network acts: kTickRate, a whole part of it or a whole multiple
   bool walks = false;
   bool waist_locked = false;  // unless the option says otherwise
   std::vector<DescriptorJoint> joints;
@@ -60,9 +68,14 @@ struct Descriptor {
   std::string output;  // of the network; "" for its only one
   int output_line = 0;
   double action_clip = std::numeric_limits<double>::infinity();  // of the output's size, before its scale
+  bool within_limits = false;  // targets of joints with an action are kept within the robot's limits
   std::optional<VelocityInterface> command;
 
-  [[nodiscard]] int actions() const;  // joints with an action
+  [[nodiscard]] int actions() const;                             // joints with an action
+  [[nodiscard]] std::vector<ActionRange> action_ranges() const;  // one for each action
+  [[nodiscard]] int ticks_per_act() const;                       // of 50 Hz, 1 where it acts more often
+  [[nodiscard]] int acts_per_tick() const;                       // 1 where it acts less often
+  [[nodiscard]] double period() const { return 1.0 / rate_hz; }  // [s]
   [[nodiscard]] ChannelWidths widths() const { return {.joints = 0, .actions = actions()}; }
   [[nodiscard]] int input_size(const ObservationInput& input) const;
   [[nodiscard]] std::vector<LayoutBlock> layout(const ObservationInput& input) const;

@@ -124,6 +124,8 @@ struct BoundJoint {
   int action = -1;  // index in the network's output; -1: the reference's angle
   double neutral = 0.0, scale = 0.0, kp = 0.0, kd = 0.0;
   double effort = std::numeric_limits<double>::infinity();
+  double lower = -std::numeric_limits<double>::infinity(), upper = std::numeric_limits<double>::infinity();
+  ActionRange clip{};
   bool around_reference = false, locked = false;
 };
 
@@ -135,7 +137,9 @@ class DescriptorController final : public Controller {
       : robot_(std::move(robot)),
         told_(std::move(told)),
         name_(descriptor.name),
-        clip_(static_cast<float>(descriptor.action_clip)),
+        ticks_per_act_(descriptor.ticks_per_act()),
+        acts_per_tick_(descriptor.acts_per_tick()),
+        period_(descriptor.period()),
         joints_(bind_joints(descriptor, *robot_, options.waist == WaistMode::kLocked)),
         network_(std::move(network), descriptor.file, network_path),
         observer_(with_yaw_scale(descriptor, options.yaw_scale), robot_, first_joints(descriptor.joints.size())),
@@ -153,9 +157,10 @@ class DescriptorController final : public Controller {
   }
 
   [[nodiscard]] std::string_view name() const override { return name_; }
+  [[nodiscard]] int acts_per_tick() const override { return acts_per_tick_; }
 
   void reset(const RobotState&) override {
-    tick_ = 0;
+    calls_ = 0;
     gate_.reset();
     std::ranges::fill(action_, 0.0F);
     rates_.reset();
@@ -165,29 +170,38 @@ class DescriptorController final : public Controller {
   }
 
   void act(const RobotState& state, const Reference& reference, JointCommand& command) override {
-    rates_.update(reference);
-    if (conversion_) command_ = conversion_->update(state, reference, rates_.v_WB(), rates_.w_WB_B().z());
-    if (told_ != nullptr) command_ = *told_;
-    gate_.update(command_.forward, command_.lateral, command_.yaw_rate);
-    const VelocityCommand shown = gate_.stands() ? VelocityCommand{.height = command_.height} : command_;
-    observer_.update({state, reference, rates_, shown, action_, tick_, gate_});
-    network_.run();
-    std::ranges::copy(network_.output(action_output_), action_.begin());
+    if (calls_ % acts_per_tick_ == 0) {
+      rates_.update(reference);
+      if (conversion_) command_ = conversion_->update(state, reference, rates_.v_WB(), rates_.w_WB_B().z());
+      if (told_ != nullptr) command_ = *told_;
+    }
+    if (calls_ % ticks_per_act_ == 0) ask(state, reference);
+    ++calls_;
     command.kp = gains_.kp;
     command.kd = gains_.kd;
     command.tau_ff = gains_.tau_ff;
     command.q_target.resize(state.q.size());
     for (const BoundJoint& joint : joints_) command.q_target[joint.robot] = target(joint, state, reference);
-    ++tick_;
   }
 
  private:
+  // The network acts: at its own rate. Its histories, its clocks and its last action know of no other tick.
+  void ask(const RobotState& state, const Reference& reference) {
+    gate_.update(command_.forward, command_.lateral, command_.yaw_rate);
+    const VelocityCommand shown = gate_.stands() ? VelocityCommand{.height = command_.height} : command_;
+    observer_.update({state, reference, rates_, shown, action_, calls_ / ticks_per_act_, gate_, period_});
+    network_.run();
+    std::ranges::copy(network_.output(action_output_), action_.begin());
+  }
+
   [[nodiscard]] double target(const BoundJoint& joint, const RobotState& state, const Reference& reference) const {
     if (joint.locked) return 0.0;
     const double wanted = reference.q[joint.robot];
     if (joint.action < 0) return wanted;
-    const float action = std::clamp(action_[joint.action], -clip_, clip_);
-    const double goal = (joint.around_reference ? wanted : joint.neutral) + joint.scale * action;
+    const float action =
+        std::clamp(action_[joint.action], static_cast<float>(joint.clip.lower), static_cast<float>(joint.clip.upper));
+    const double free = (joint.around_reference ? wanted : joint.neutral) + joint.scale * action;
+    const double goal = std::clamp(free, joint.lower, joint.upper);
     if (joint.effort == std::numeric_limits<double>::infinity() || joint.kp == 0.0) return goal;
     const double middle = state.q[joint.robot] + joint.kd * state.v[joint.robot] / joint.kp;
     return std::clamp(goal, middle - joint.effort / joint.kp, middle + joint.effort / joint.kp);
@@ -198,6 +212,7 @@ class DescriptorController final : public Controller {
     const JointBinding bound = bind_by_name(names_of(descriptor.joints), robot);
     if (!bound.absent.empty())
       refuse_robot(descriptor, robot, unknown_name_message("joint", bound.absent[0], robot.joint_names()));
+    const std::vector<ActionRange> clips = descriptor.action_ranges();
     std::vector<BoundJoint> joints;
     int actions = 0;
     for (size_t j = 0; j < descriptor.joints.size(); ++j) {
@@ -210,6 +225,11 @@ class DescriptorController final : public Controller {
                         .kd = joint.kd,
                         .effort = joint.effort.value_or(std::numeric_limits<double>::infinity()),
                         .around_reference = joint.around_reference});
+      if (!joint.action) continue;
+      joints.back().clip = clips[static_cast<size_t>(actions) - 1];
+      if (!descriptor.within_limits) continue;
+      joints.back().lower = robot.joints[bound.indices[j]].lower;
+      joints.back().upper = robot.joints[bound.indices[j]].upper;
     }
     add_other_joints(descriptor, robot, bound.unnamed, joints);
     const std::vector<int> tilting = tilting_waist(robot);
@@ -273,7 +293,8 @@ class DescriptorController final : public Controller {
   std::shared_ptr<const RobotModel> robot_;
   std::shared_ptr<const VelocityCommand> told_;  // null: the reference's root, or a fixed command
   std::string name_;
-  float clip_;
+  int ticks_per_act_, acts_per_tick_;  // one of them is 1
+  double period_;                      // of the network [s]
   std::vector<BoundJoint> joints_;
   BoundNetwork network_;
   Observer observer_;
@@ -284,7 +305,7 @@ class DescriptorController final : public Controller {
   std::vector<float> action_;  // the network's last output
   JointCommand gains_;
   int action_output_ = 0;
-  long tick_ = 0;  // since reset
+  long calls_ = 0;  // of act() since reset
 };
 
 }  // namespace
@@ -309,6 +330,9 @@ std::unique_ptr<Controller> make_descriptor_controller(
   require(told == nullptr || descriptor.command.has_value(),
           "{}: controller '{}': expected a descriptor with a 'command' to be told a velocity, found none",
           descriptor.file, descriptor.name);
+  require(told == nullptr || descriptor.acts_per_tick() == 1,
+          "{}: controller '{}': expected a rate_hz of at most {} to be told a velocity at each tick, found {}",
+          descriptor.file, descriptor.name, kTickRate, descriptor.rate_hz);
   const DescriptorOptions read =
       read_options("controller", descriptor.name, option_table(descriptor), options, defaults_of(descriptor));
   return std::make_unique<DescriptorController>(descriptor, std::move(robot), std::move(network), network_path, read,

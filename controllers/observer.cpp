@@ -19,8 +19,9 @@ void write_axes(const Channel& channel, const Eigen::Vector3d& v, ChannelWriter&
 }
 
 void write_waves(const Channel& channel, const Senses& senses, double (*wave)(double), ChannelWriter& out) {
+  const bool silent = channel.gait.silent && senses.gate.stands();
   for (size_t i = 0; i < channel.gait.phases.size(); ++i)
-    out(wave(gait_angle(channel.gait, i, senses.tick, senses.gate)));
+    out(silent ? 0.0 : wave(gait_angle(channel.gait, i, senses.tick, senses.gate, senses.period)));
 }
 
 // The velocity of a point fixed to the base, in the base's axes.
@@ -77,7 +78,7 @@ Observer::Observer(const Descriptor& descriptor, std::shared_ptr<const RobotMode
     : robot_(std::move(robot)),
       joints_(std::move(robot_joints)),
       neutral_(descriptor.joints.size()),
-      action_clip_(descriptor.action_clip),
+      action_ranges_(descriptor.action_ranges()),
       kinematics_(*robot_),
       reference_kinematics_(*robot_),
       writer_(bound_layout(descriptor.observation, *robot_), descriptor.widths()) {
@@ -107,17 +108,22 @@ void Observer::show(const Channel& channel, const Senses& senses, ChannelWriter&
       return write_axes(channel, sensor_rotation(channel, state).conjugate() * -Eigen::Vector3d::UnitZ(), out);
     case ChannelKind::kRollPitch:
       return out(roll_pitch_of(state.X_WB.R));
+    case ChannelKind::kRollPitchYaw: {
+      const Eigen::Vector2d tilt = roll_pitch_of(state.X_WB.R);
+      return write_axes(channel, {tilt.x(), tilt.y(), yaw_of(state.X_WB.R)}, out);
+    }
     case ChannelKind::kCommandVelocity:
       return write_axes(channel, {senses.command.forward, senses.command.lateral, senses.command.yaw_rate}, out);
     case ChannelKind::kCommandHeight:
       return out(senses.command.height);
     case ChannelKind::kCommandStand:
       return out(senses.gate.stands() ? 0.0 : 1.0);
-    case ChannelKind::kPreviousAction: {
-      const double bound = channel.clipped ? action_clip_ : std::numeric_limits<double>::infinity();
-      for (const float action : senses.action) out(std::clamp<double>(action, -bound, bound));
+    case ChannelKind::kPreviousAction:
+      for (size_t a = 0; a < senses.action.size(); ++a) {
+        const ActionRange range = channel.clipped ? action_ranges_[a] : ActionRange{};
+        out(std::clamp<double>(senses.action[a], range.lower, range.upper));
+      }
       return;
-    }
     case ChannelKind::kReferenceRootVelocity:
       return write_axes(channel, root_velocity(senses), out);
     case ChannelKind::kReferenceHeight:
@@ -150,7 +156,7 @@ void Observer::show_joints(const Channel& channel, const Senses& senses, Channel
     const int j = channel.joints[k];
     const int r = joints_[j];
     if (channel.kind == ChannelKind::kJointPosition)
-      out(senses.state.q[r] - neutral_[j]);
+      out(channel.zeroed[k] ? 0.0 : senses.state.q[r] - neutral_[j]);
     else if (channel.kind == ChannelKind::kJointVelocity)
       out(channel.zeroed[k] ? 0.0 : senses.state.v[r]);
     else if (channel.kind == ChannelKind::kReferenceJointAngle)

@@ -41,8 +41,9 @@ struct Senses {
   const ReferenceRates& rates;
   const VelocityCommand& command;
   std::span<const float> action;  // the network's last output
-  long tick = 0;                  // since reset
+  long tick = 0;                  // of the network's, since reset
   const StandGate& gate;          // where it is told to stand, `command` has no velocity
+  double period = kTick;          // of the network's ticks [s]
 };
 
 class Observer {
@@ -67,13 +68,13 @@ class Observer {
   std::shared_ptr<const RobotModel> robot_;  // the kinematics' model
   std::vector<int> joints_;
   Eigen::VectorXd neutral_;  // per descriptor's joint
-  double action_clip_;
+  std::vector<ActionRange> action_ranges_;
   bool anchored_ = false, placed_ = false;  // whether poses of the reference's, of the robot's links are needed
   Kinematics kinematics_, reference_kinematics_;
   ObservationWriter writer_;
 };
 
-// Angles of R_WB = Rz(yaw) Ry(pitch) Rx(roll) [rad].
+// Angles of R_WB = Rz(yaw) Ry(pitch) Rx(roll) [rad]; the yaw is yaw_of.
 Eigen::Vector2d roll_pitch_of(const Eigen::Quaterniond& R_WB);
 
 }  // namespace duet

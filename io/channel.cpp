@@ -49,13 +49,17 @@ const std::vector<ChannelRow>& channel_table() {
       {K::kGravity, "projected_gravity", "gravity", "gravity", " axes frame ", 3, "3",
        "direction of gravity in the axes of the base, or of that frame"},
       {K::kRollPitch, "roll_pitch", "", "", "", 2, "2 [rad]", "of the base"},
+      {K::kRollPitchYaw, "roll_pitch_yaw", "", "", " axes ", 3, "3 [rad]",
+       "of the base: turns about the fixed axes x, y, z of W; the yaw is the world's, in (-pi, pi]"},
       {K::kCommandVelocity, "command_velocity", "", "", " axes ", 3, "3 [m/s, m/s, rad/s]",
        "forward, lateral, yaw rate; `axes`: which of them, in which order: `[2]`, `[0, 1]`"},
       {K::kCommandHeight, "command_height", "", "", "", 1, "1 [m]", "the commanded height of the pelvis"},
       {K::kCommandStand, "command_stand", "", "", "", 1, "1", "1 walks, 0 stands; needs `stands_below` of `command`"},
       {K::kJointAngle, "", "joint_positions", "", "", 0, "one per joint [rad]", "joint angles"},
-      {K::kJointPosition, "joint_position", "joint_offsets", "joint_position", " joints ", 0, "one per joint [rad]",
-       "joint angles from the default pose, of a policy from the card's neutral pose"},
+      {K::kJointPosition, "joint_position", "joint_offsets", "joint_position", " joints zero ", 0,
+       "one per joint [rad]",
+       "joint angles from the default pose, of a policy from the card's neutral pose; `zero`: joints that are shown "
+       "as 0"},
       {K::kJointVelocity, "joint_velocity", "joint_velocities", "joint_velocity", " joints zero ", 0,
        "one per joint [rad/s]", "`zero`: joints that are shown as 0"},
       {K::kRootOffset, "", "root_offset", "root_translation", "", 3, "3 [m]",
@@ -63,7 +67,7 @@ const std::vector<ChannelRow>& channel_table() {
       {K::kRootOrientation, "", "root_orientation", "root_orientation", "", 4, "4",
        "quaternion wxyz, w >= 0, in W; with `ego` in E"},
       {K::kPreviousAction, "previous_action", "", "previous_action", " clipped ", 0, "one per action",
-       "the network's last output, zeros at the start; `clipped: true`: after `clip` of `action`"},
+       "the network's last output, zeros at the start; `clipped: true`: after `clip` of `action` and of the joints"},
       {K::kReferenceRootVelocity, "reference_root_velocity", "", "", " axes ", 3, "3 [m/s]",
        "in the axes of the reference's root"},
       {K::kReferenceHeight, "reference_height", "", "", "", 1, "1 [m]", "of the reference's root"},
@@ -85,15 +89,14 @@ const std::vector<ChannelRow>& channel_table() {
        "of the reference's `frame` in the robot's"},
       {K::kAnchorOrientationError, "anchor_orientation_error", "", "", " frame ", 6, "6",
        "first two columns of its rotation, row by row"},
-      {K::kGaitSine, "gait_sine", "", "", " frequency_hz phases standing stance ", 0, "one per phase",
+      {K::kGaitSine, "gait_sine", "", "", " frequency_hz phases standing after_standing stance ", 0, "one per phase",
        "of a clock with `frequency_hz`. `phases`: at the start (default 0) [rad]; `standing`: phases held while told "
-       "to "
-       "stand, one each, after which the clock starts again at `phases` (without it the clock goes on; needs "
-       "`stands_below`); `stance`: share of a turn, in (0, 1), that takes the first half of the wave, the rest the "
-       "second "
-       "(piecewise linear, of held phases too)"},
-      {K::kGaitCosine, "gait_cosine", "", "", " frequency_hz phases standing stance ", 0, "one per phase",
-       "the same clock's cosine"},
+       "to stand, one each, or `zero`: sine and cosine are both 0 then (without it the clock goes on; needs "
+       "`stands_below`); `after_standing`: the clock `restarts` at `phases` (default), is where it would be had it "
+       "not been held (`runs_on`), or goes on where it was held (`pauses`); `stance`: share of a turn, in (0, 1), "
+       "that takes the first half of the wave, the rest the second (piecewise linear, of held phases too)"},
+      {K::kGaitCosine, "gait_cosine", "", "", " frequency_hz phases standing after_standing stance ", 0,
+       "one per phase", "the same clock's cosine"},
       {K::kTick, "tick", "", "", "", 1, "1", "ticks since the start"},
       {K::kConstant, "constant", "", "", " values ", 0, "as given", "the numbers of `values`"},
       {K::kLanguage, "", "language", "", "", kPromptNumbers, "768",
@@ -163,10 +166,15 @@ double warped_angle(double angle, double stance) {
   return kTurn * (place < stance ? 0.5 * place / stance : 0.5 + 0.5 * (place - stance) / (1.0 - stance));
 }
 
-double plain_angle(const GaitClock& clock, std::size_t phase, long tick, const StandGate& gate) {
-  const bool gated = !clock.standing.empty();
-  if (gated && gate.stands()) return clock.standing[phase];
-  const double turns = clock.frequency_hz * kTick * static_cast<double>(gated ? gate.walking_tick() : tick);
+// Ticks that the clock has gone.
+long clock_ticks(const GaitClock& clock, long tick, const StandGate& gate) {
+  if (clock.standing.empty() || clock.after_standing == AfterStanding::kRunsOn) return tick;
+  return clock.after_standing == AfterStanding::kPauses ? gate.walked_ticks() : gate.walking_tick();
+}
+
+double plain_angle(const GaitClock& clock, std::size_t phase, long tick, const StandGate& gate, double period) {
+  if (!clock.standing.empty() && gate.stands()) return clock.standing[phase];
+  const double turns = clock.frequency_hz * period * static_cast<double>(clock_ticks(clock, tick, gate));
   return kTurn * (turns - std::floor(turns)) + clock.phases[phase];
 }
 
@@ -174,11 +182,12 @@ double plain_angle(const GaitClock& clock, std::size_t phase, long tick, const S
 
 void StandGate::update(double forward, double lateral, double yaw_rate) {
   stands_ = bounds_ && std::hypot(forward, lateral) < bounds_->speed && std::abs(yaw_rate) < bounds_->yaw_rate;
+  walked_ticks_ += walking_tick_ >= 0 ? 1 : 0;
   walking_tick_ = stands_ ? -1 : walking_tick_ + 1;
 }
 
-double gait_angle(const GaitClock& clock, std::size_t phase, long tick, const StandGate& gate) {
-  const double angle = plain_angle(clock, phase, tick, gate);
+double gait_angle(const GaitClock& clock, std::size_t phase, long tick, const StandGate& gate, double period) {
+  const double angle = plain_angle(clock, phase, tick, gate, period);
   return clock.stance ? warped_angle(angle, *clock.stance) : angle;
 }
 

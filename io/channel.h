@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/core/robot_state.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {
@@ -28,29 +29,39 @@ class StandGate {
  public:
   explicit StandGate(const std::optional<StandBounds>& bounds = {}) : bounds_(bounds) {}  // none: never to stand
 
-  void reset() { walking_tick_ = -1; }
+  void reset() {
+    walking_tick_ = -1;
+    walked_ticks_ = 0;
+  }
   // The command of a tick: velocity in the plane [m/s] and yaw rate [rad/s].
   void update(double forward, double lateral, double yaw_rate);
 
   [[nodiscard]] bool stands() const { return stands_; }              // of the last update
   [[nodiscard]] long walking_tick() const { return walking_tick_; }  // 0 at the first tick of walking
+  [[nodiscard]] long walked_ticks() const { return walked_ticks_; }  // of walking, before that of the last update
 
  private:
   std::optional<StandBounds> bounds_;
   bool stands_ = false;
   long walking_tick_ = -1;
+  long walked_ticks_ = 0;
 };
+
+// What a clock does that was held while a walker stood.
+enum class AfterStanding { kRestarts, kRunsOn, kPauses };
 
 struct GaitClock {
   double frequency_hz = 0.0;
   std::vector<double> phases{};    // at the start [rad]
   std::vector<double> standing{};  // phases held while told to stand, one each; empty: the clock goes on
   std::optional<double> stance{};  // share of a turn, in (0, 1), that takes the first half of the wave
+  bool silent = false;             // its waves are both 0 while told to stand: no angle has these
+  AfterStanding after_standing = AfterStanding::kRestarts;
 };
 
-// Angle of one of the clock's phases [rad]. `tick`: since the start. With `standing` the clock starts at its phases
-// whenever the gate lets it go.
-double gait_angle(const GaitClock& clock, std::size_t phase, long tick, const StandGate& gate);
+// Angle of one of the clock's phases [rad]. `tick`: since the start; the gate counts the same ticks, of `period` [s].
+// With `standing` the clock goes on as `after_standing` says whenever the gate lets it go.
+double gait_angle(const GaitClock& clock, std::size_t phase, long tick, const StandGate& gate, double period = kTick);
 
 // Where channels are named. A channel that a format does not name cannot be shown there.
 enum class ChannelFormat {
@@ -67,6 +78,7 @@ enum class ChannelKind {
   kBaseAngularVelocity,
   kGravity,
   kRollPitch,
+  kRollPitchYaw,
   kCommandVelocity,
   kCommandHeight,
   kCommandStand,
@@ -110,7 +122,7 @@ struct Channel {
   std::vector<bool> zeroed = {};                          // per entry of `joints`: shown as 0
   std::vector<int> axes = {};                             // components of a vector that are shown
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();       // p_BF of the point whose velocity is shown [m]
-  bool clipped = false;                                   // previous_action: after the action's clip
+  bool clipped = false;                                   // previous_action: after the clip of the actions
   std::string frame = {};                                 // of the robot: the anchor; of a gyro: "" is the base
   int frame_index = -1;                                   // of `frame` in the robot, once it is bound; -1: the base
   GaitClock gait = {};                                    // of a clock

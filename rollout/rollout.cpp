@@ -85,9 +85,10 @@ class PhysicsWorld final : public World {
         backend_(backend),
         controller_(controller),
         steps_(steps_per_tick(backend.scene().dt)),
+        steps_per_act_(steps_of_act(episode, backend.scene().dt, controller)),
         command_(backend.scene().robot->default_command(episode.start.q)),
-        disturbance_(episode.perturbation, *backend.scene().robot, episode.start, steps_, backend.scene().dt,
-                     episode.perturbation_seed),
+        disturbance_(episode.perturbation, *backend.scene().robot, episode.start, steps_per_act_,
+                     steps_ / steps_per_act_, backend.scene().dt, episode.perturbation_seed),
         meter_(backend, episode.limits) {}
 
   void begin(const RobotState& start) override {
@@ -101,8 +102,8 @@ class PhysicsWorld final : public World {
   [[nodiscard]] std::span<const Contact> contacts() const override { return backend_.contacts(); }
 
   const Eigen::VectorXd& target(const Reference& reference) override {
-    controller_.act(disturbance_.seen(state()), reference, command_);
-    disturbance_.send(command_);
+    reference_ = &reference;
+    act();
     return command_.q_target;
   }
 
@@ -114,7 +115,11 @@ class PhysicsWorld final : public World {
       backend_.set_partner(partner_joints(partner, tick), partner_velocities(partner, tick, kTickRate));
     disturbance_.act(tick, backend_);
     const Outcome outcome = step_control_period(
-        backend_, steps_, [this](int i) -> const JointCommand& { return disturbance_.in_effect(i); },
+        backend_, steps_,
+        [this](int i) -> const JointCommand& {
+          if (i > 0 && i % steps_per_act_ == 0) act();
+          return disturbance_.in_effect(i % steps_per_act_);
+        },
         [&](int i) {
           meter_.add();
           const bool look = (i + 1) % kStepsPerLook == kStepsPerLook - 1 && i + 1 < steps_;
@@ -131,13 +136,31 @@ class PhysicsWorld final : public World {
   }
 
  private:
+  // Physics steps between two acts of the controller.
+  static int steps_of_act(const Episode& episode, double dt, const Controller& controller) {
+    const int steps = steps_per_tick(dt), acts = controller.acts_per_tick();
+    require(steps % acts == 0,
+            "controller '{}' acts {} times in a control period: expected a physics step that divides {} s, found {} s",
+            controller.name(), acts, kTick / acts, dt);
+    require(acts == 1 || episode.restart == nullptr,
+            "controller '{}' acts {} times in a control period: its episodes cannot begin in the middle of one",
+            controller.name(), acts);
+    return steps / acts;
+  }
+
+  void act() {
+    controller_.act(disturbance_.seen(state()), *reference_, command_);
+    disturbance_.send(command_);
+  }
+
   [[nodiscard]] bool is_recorded() const { return episode_.restart != nullptr && tick_ < episode_.restart->tick; }
 
   const Episode& episode_;
   Backend& backend_;
   Controller& controller_;
   int tick_ = 0;
-  int steps_;
+  int steps_, steps_per_act_;
+  const Reference* reference_ = nullptr;  // of the tick
   JointCommand command_;
   Disturbance disturbance_;
   StepMeter meter_;

@@ -39,12 +39,12 @@ std::string named_link(const std::string& name, const RobotModel& robot) {
 }
 
 Disturbance::Disturbance(const Perturbation& perturbation, const RobotModel& robot, const RobotState& start,
-                         int steps_per_tick, double dt, std::uint64_t seed)
-    : past_(perturbation.delay_ticks + 1, start),
+                         int steps_per_act, int acts_per_tick, double dt, std::uint64_t seed)
+    : past_(perturbation.delay_ticks * acts_per_tick + 1, start),
       seen_(start),
-      steps_per_tick_(steps_per_tick),
+      steps_per_act_(steps_per_act),
       late_steps_(static_cast<int>(std::lround(perturbation.latency_ms / 1000.0 / dt))),
-      commands_((late_steps_ + steps_per_tick - 1) / steps_per_tick + 1, robot.default_command(start.q)) {
+      commands_((late_steps_ + steps_per_act - 1) / steps_per_act + 1, robot.default_command(start.q)) {
   for (const std::shared_ptr<const RobotPerturbation>& one : perturbation.robot)
     if (std::unique_ptr<RobotAct> begun = one->begin(robot, seed)) acts_.push_back(std::move(begun));
   view_changes_ = std::ranges::any_of(acts_, [](const auto& one) { return one->changes_the_view(); });
@@ -64,9 +64,9 @@ void Disturbance::send(const JointCommand& command) {
   commands_[latest_] = command;
 }
 
-// The command sent `age` ticks ago began to act late_steps_ steps after its tick did.
+// The command sent `age` acts ago began to act late_steps_ steps after it was sent.
 const JointCommand& Disturbance::in_effect(int step) const {
-  const int age = step >= late_steps_ ? 0 : (late_steps_ - step + steps_per_tick_ - 1) / steps_per_tick_;
+  const int age = step >= late_steps_ ? 0 : (late_steps_ - step + steps_per_act_ - 1) / steps_per_act_;
   return commands_[(latest_ + commands_.size() - static_cast<std::size_t>(age)) % commands_.size()];
 }
 

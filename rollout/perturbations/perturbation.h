@@ -29,7 +29,7 @@ class RobotAct {
   virtual ~RobotAct() = default;
 
   [[nodiscard]] virtual bool changes_the_view() const { return false; }
-  // Changes the state that the controller sees; called once a tick, if changes_the_view().
+  // Changes the state that the controller sees; called as often as it acts, if changes_the_view().
   virtual void see(RobotState&) {}
   // Acts on the robot before the physics steps of `tick`.
   virtual void act(int, Backend&) {}
@@ -118,15 +118,15 @@ std::shared_ptr<const RobotModel> perturbed_robot(const Perturbation& perturbati
 class Disturbance {
  public:
   // `start` is what the controller sees of the time before the episode, and what the joints hold until the first
-  // command arrives. `steps_per_tick` physics steps of `dt` [s] are one control tick.
-  Disturbance(const Perturbation& perturbation, const RobotModel& robot, const RobotState& start, int steps_per_tick,
-              double dt, std::uint64_t seed);
+  // command arrives. `steps_per_act` physics steps of `dt` [s] lie between two commands, `acts_per_tick` in a tick.
+  Disturbance(const Perturbation& perturbation, const RobotModel& robot, const RobotState& start, int steps_per_act,
+              int acts_per_tick, double dt, std::uint64_t seed);
 
-  // The controller's view at this tick; once per tick. `state` itself without delay and where no act changes it.
+  // The controller's view at this act; once per act. `state` itself without delay and where no act changes it.
   const RobotState& seen(const RobotState& state);
-  // The command of this tick; once per tick. Copies.
+  // The command of this act; once per act. Copies.
   void send(const JointCommand& command);
-  // The command that is in effect in a physics step of this tick, counted from 0.
+  // The command that is in effect in a physics step since the last one was sent, counted from 0.
   [[nodiscard]] const JointCommand& in_effect(int step) const;
   // Acts on the robot; before the physics steps of `tick`.
   void act(int tick, Backend& backend);
@@ -135,11 +135,11 @@ class Disturbance {
   std::vector<std::unique_ptr<RobotAct>> acts_;
   bool view_changes_ = false;
 
-  std::vector<RobotState> past_;  // a ring of the last delay_ticks + 1 states
+  std::vector<RobotState> past_;  // a ring of the states that were seen since delay_ticks ago
   std::size_t newest_ = 0;
   RobotState seen_;
 
-  int steps_per_tick_;
+  int steps_per_act_;
   int late_steps_;                      // from a command to its effect
   std::vector<JointCommand> commands_;  // a ring of the latest, newest at latest_
   std::size_t latest_ = 0;

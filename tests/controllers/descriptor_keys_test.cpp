@@ -153,6 +153,146 @@ TEST(GatedClock, StartsAtItsPhasesWhereItIsToldToWalkAtOnceAndAfterAReset) {
   }
 }
 
+// What a clock shows after standing, by its tick: walking for 3 ticks, standing for 2, walking again.
+TEST(GatedClock, RestartsRunsOnOrPausesAsItIsTold) {
+  const std::pair<AfterStanding, std::vector<int>> cases[] = {{AfterStanding::kRestarts, {0, 1, 2, -1, -1, 0, 1}},
+                                                              {AfterStanding::kRunsOn, {0, 1, 2, -1, -1, 5, 6}},
+                                                              {AfterStanding::kPauses, {0, 1, 2, -1, -1, 3, 4}}};
+  for (const auto& [after, ticks] : cases)
+    for (const bool silent : {false, true}) {
+      Channel sine = gait(ChannelKind::kGaitSine, {0.1}, {0.3}), cosine = gait(ChannelKind::kGaitCosine, {0.1}, {0.3});
+      for (Channel* channel : {&sine, &cosine}) {
+        channel->gait.after_standing = after;
+        channel->gait.silent = silent;
+      }
+      auto told = std::make_shared<VelocityCommand>();
+      const test::ToldLayout l(showing({sine, cosine}, StandBounds{.speed = 0.1, .yaw_rate = 0.1}), told);
+      for (const int tick : ticks) {
+        told->forward = tick < 0 ? 0.0 : 0.5;
+        l.act();
+        const double angle = tick < 0 ? 0.3 : 0.1 + 2.0 * kPi * 0.02 * tick;
+        const double size = tick < 0 && silent ? 0.0 : 1.0;
+        EXPECT_NEAR(l.memory->shown[0][0], size * std::sin(angle), kNear) << tick;
+        EXPECT_NEAR(l.memory->shown[0][1], size * std::cos(angle), kNear) << tick;
+      }
+    }
+}
+
+// HOMIE's joints and a clock, at another rate.
+Descriptor at_rate(double rate_hz) {
+  Descriptor descriptor = showing(
+      {channel_of(ChannelKind::kTick), gait(ChannelKind::kGaitSine, {0.0}), channel_of(ChannelKind::kPreviousAction)});
+  descriptor.rate_hz = rate_hz;
+  return descriptor;
+}
+
+TEST(Rate, BelowFiftyTheNetworkActsEverySecondTickAndItsTargetsStand) {
+  Layout l = layout_of(at_rate(25.0), {{"command", "0,0,0"}});
+  EXPECT_EQ(l.controller->acts_per_tick(), 1);
+  const int follower = l.robot->joint_index("left_elbow_joint");
+  double target = 0.0;
+  for (int tick = 0; tick < 8; ++tick) {
+    const float asked = 0.1F * static_cast<float>(tick + 1);
+    l.memory.answered[0][0] = asked;
+    l.reference.q[follower] = tick;
+    l.act();
+    EXPECT_EQ(l.memory.runs, tick / 2 + 1);
+    EXPECT_EQ(l.shown(0), tick / 2) << "ticks are the network's";
+    EXPECT_NEAR(l.shown(1), std::sin(2.0 * kPi * 0.04 * (tick / 2)), kNear) << "seconds are the world's";
+    EXPECT_NEAR(l.shown(2), tick < 2 ? 0.0 : 0.1 * (tick / 2 * 2 - 1), kNear) << "the action of its tick before";
+    if (tick % 2 == 0) target = l.command.q_target[l.joint("left_hip_pitch")];
+    EXPECT_EQ(l.command.q_target[l.joint("left_hip_pitch")], target) << tick;
+    EXPECT_EQ(l.command.q_target[follower], tick) << "the reference's joints follow at 50 Hz";
+  }
+}
+
+TEST(Rate, AboveFiftyItActsWithinATick) {
+  Layout l = layout_of(at_rate(100.0), {{"command", "0,0,0"}});
+  EXPECT_EQ(l.controller->acts_per_tick(), 2);
+  for (int call = 0; call < 8; ++call) {
+    l.act();
+    EXPECT_EQ(l.memory.runs, call + 1);
+    EXPECT_EQ(l.shown(0), call);
+    EXPECT_NEAR(l.shown(1), std::sin(2.0 * kPi * 0.01 * call), kNear);
+  }
+}
+
+// The reference moves once a tick, however often the controller acts in it.
+TEST(Rate, TheReferencesSpeedIsOfItsTicks) {
+  Channel speed = channel_of(ChannelKind::kReferenceJointVelocity);
+  speed.joints = {0};
+  Descriptor descriptor = showing({speed});
+  descriptor.rate_hz = 100.0;
+  Layout l = layout_of(descriptor, {{"command", "0,0,0"}});
+  const int joint = l.joint("left_hip_pitch");
+  for (int call = 0; call < 8; ++call) {
+    if (call > 0 && call % 2 == 0) l.reference.q[joint] += 0.01;
+    l.act();
+    EXPECT_NEAR(l.shown(0), call < 2 ? 0.0 : 0.5, 1e-5) << call;
+  }
+}
+
+TEST(Rate, AboveFiftyNobodyTellsAVelocityAtEachTick) {
+  EXPECT_SENTENCE(thrown_message<std::invalid_argument>(
+      [] { test::ToldLayout(at_rate(100.0), std::make_shared<VelocityCommand>()); }));
+}
+
+TEST(RollPitchYaw, AreTheTurnsAboutTheAxesOfTheWorld) {
+  Channel all = channel_of(ChannelKind::kRollPitchYaw), yaw = all;
+  yaw.axes = {2};
+  yaw.scale = {-2.0};
+  Layout l = layout_of(showing({all, yaw}), {{"command", "0,0,0"}});
+  for (const double heading : {0.7, -3.0, 3.1, 3.5}) {
+    l.state.X_WB.R = Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()) *
+                     Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()) *
+                     Eigen::AngleAxisd(-0.1, Eigen::Vector3d::UnitX());
+    l.act();
+    const double wrapped = std::remainder(heading, 2.0 * kPi);
+    l.expect_vector(0, {-0.1, 0.2, wrapped}, "angles");
+    EXPECT_NEAR(l.shown(3), -2.0 * wrapped, kNear);
+  }
+}
+
+TEST(ActionRange, IsEachJointsOwnAndThePreviousActionKnowsIt) {
+  Channel raw = channel_of(ChannelKind::kPreviousAction), clipped = raw;
+  clipped.clipped = true;
+  Descriptor descriptor = showing({raw, clipped});
+  descriptor.action_clip = 0.25;
+  descriptor.joints[0].clip = {-0.3, 0.05};
+  descriptor.joints[3].clip = {0.35, 2.0};
+  Layout l = layout_of(descriptor, {{"command", "0,0,0"}});
+  l.act();
+  l.act();
+  const double taken[] = {0.05, 0.2, 0.25, 0.4, 0.25};  // of 0.1, 0.2, ...
+  for (int a = 0; a < 5; ++a) {
+    EXPECT_NEAR(l.shown(a), 0.1 * (a + 1), kNear) << a;
+    EXPECT_NEAR(l.shown(12 + a), taken[a], kNear) << a;
+    const int joint = l.robot->joint_index(descriptor.joints[a].name);
+    EXPECT_NEAR(l.command.q_target[joint], l.neutral(joint) + 0.25 * taken[a], kNear) << a;
+  }
+}
+
+TEST(WithinLimits, KeepsTargetsOfActionsInsideTheJointsRange) {
+  Descriptor descriptor = showing({channel_of(ChannelKind::kTick)});
+  for (const bool within : {false, true}) {
+    descriptor.within_limits = within;
+    Layout l = layout_of(descriptor, {{"command", "0,0,0"}});
+    for (const float size : {50.0F, -50.0F}) {
+      std::ranges::fill(l.memory.answered[0], size);
+      l.reference.q.setConstant(50.0);
+      l.act();
+      for (const DescriptorJoint& joint : descriptor.joints) {
+        if (!joint.action) continue;
+        const int j = l.robot->joint_index(joint.name);
+        const double free = joint.neutral + *joint.action * size;
+        const double limit = size > 0.0F ? l.robot->joints[j].upper : l.robot->joints[j].lower;
+        EXPECT_NEAR(l.command.q_target[j], within ? limit : free, 1e-3) << joint.name;
+      }
+      EXPECT_EQ(l.command.q_target[l.robot->joint_index("left_elbow_joint")], 50.0) << "the reference's are not its";
+    }
+  }
+}
+
 // OpenWBT's: a foot stands for 0.6 of its cycle, which is the first half of the wave.
 TEST(WarpedClock, TakesTheStanceForTheFirstHalfOfTheWave) {
   Channel channel = gait(ChannelKind::kGaitSine, {0.0, 0.6 * kPi, 1.2 * kPi, 1.6 * kPi, 4.6 * kPi, -0.4 * kPi});

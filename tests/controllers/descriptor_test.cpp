@@ -75,7 +75,8 @@ TEST(IoDescriptor, RefusesKeysOfAnotherChannel) {
 }
 
 TEST(IoDescriptor, RefusesValuesOutOfRange) {
-  EXPECT_SENTENCE(message(changed("rate_hz: 50", "rate_hz: 100")));
+  for (const char* rate : {"60", "0", "-50", "3", "75", "1000", ".inf"})
+    EXPECT_SENTENCE(message(changed("rate_hz: 50", std::string("rate_hz: ") + rate)));
   EXPECT_SENTENCE(message(changed("kp: 10", "kp: -10")));
   EXPECT_SENTENCE(message(changed("kp: 10", "kp: .nan")));
   EXPECT_SENTENCE(message(changed("effort: 5", "effort: 0")));
@@ -90,6 +91,47 @@ TEST(IoDescriptor, RefusesValuesOutOfRange) {
 constexpr const char* kWalking =
     "command: {forward: {limits: [-1, 1]}, lateral: {limits: [-1, 1]}, yaw: {limits: [-1, 1]}, "
     "stands_below: {speed: 0.1, yaw_rate: 0.2}}\n";
+
+TEST(IoDescriptor, TheRateIsAWholePartOrAMultipleOfFifty) {
+  const std::tuple<const char*, int, int> rates[] = {
+      {"50", 1, 1}, {"25", 2, 1}, {"12.5", 4, 1}, {"100", 1, 2}, {"200", 1, 4}};
+  for (const auto& [rate, ticks, acts] : rates) {
+    const Descriptor d = parse_descriptor(changed("rate_hz: 50", std::string("rate_hz: ") + rate), "x.yaml");
+    EXPECT_EQ(d.ticks_per_act(), ticks) << rate;
+    EXPECT_EQ(d.acts_per_tick(), acts) << rate;
+    EXPECT_DOUBLE_EQ(d.period(), 1.0 / d.rate_hz);
+  }
+}
+
+TEST(IoDescriptor, AnActionsRangeIsItsJointsOrElseThatOfAll) {
+  const auto range = [](const std::string& one, const std::string& all) {
+    return parse_descriptor(changed("action: 0.25}", "action: 0.25" + one + "}") + all, "x.yaml").action_ranges().at(0);
+  };
+  EXPECT_EQ(range("", "").upper, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(range("", "action: {clip: 3}\n").lower, -3.0);
+  EXPECT_EQ(range(", clip: 2", "action: {clip: 3}\n").lower, -2.0);
+  EXPECT_EQ(range(", clip: [-0.5, 2]", "action: {clip: 3}\n").lower, -0.5);
+  EXPECT_EQ(range(", clip: [-0.5, 2]", "").upper, 2.0);
+  for (const char* clip : {"0", "-1", "[2, 1]", "[1, 1]", "[1, 2, 3]", "wide"})
+    EXPECT_SENTENCE(message(changed("action: 0.25}", std::string("action: 0.25, clip: ") + clip + "}")));
+  EXPECT_SENTENCE(message(changed("{name: b,", "{name: b, clip: 1,")));
+}
+
+TEST(IoDescriptor, AClockMayBeSilentWhileItStands) {
+  const auto gait = [](const std::string& keys) {
+    return changed("{channel: previous_action}", "{channel: gait_cosine, frequency_hz: 1, " + keys + "}");
+  };
+  const Descriptor d =
+      parse_descriptor(gait("phases: [0, 3], standing: zero, after_standing: pauses") + kWalking, "x.yaml");
+  const GaitClock& clock = d.observation.groups[1].channels[0].gait;
+  EXPECT_TRUE(clock.silent);
+  EXPECT_EQ(clock.standing.size(), 2U);
+  EXPECT_EQ(clock.after_standing, AfterStanding::kPauses);
+  EXPECT_SENTENCE(message(gait("standing: zero")));
+  EXPECT_SENTENCE(message(gait("standing: none") + kWalking));
+  EXPECT_SENTENCE(message(gait("after_standing: pauses") + kWalking));
+  EXPECT_SENTENCE(message(gait("standing: [1], after_standing: stops") + kWalking));
+}
 
 TEST(IoDescriptor, ACommandIsShownByItsAxesInTheirOrder) {
   const Descriptor d = parse_descriptor(

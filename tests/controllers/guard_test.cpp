@@ -19,6 +19,7 @@ class Offset final : public Controller {
  public:
   Offset(const double& offset, int& calls) : offset_(offset), calls_(calls) {}
   [[nodiscard]] std::string_view name() const override { return "offset"; }
+  [[nodiscard]] int acts_per_tick() const override { return acts; }
   void reset(const RobotState&) override {}
   void act(const RobotState&, const Reference& reference, JointCommand& command) override {
     ++calls_;
@@ -26,6 +27,8 @@ class Offset final : public Controller {
     command.q_target[3] += offset_;
     command.kp.setConstant(77.0);
   }
+
+  int acts = 1;
 
  private:
   const double& offset_;
@@ -77,6 +80,24 @@ TEST_F(Guarded, HoldsTheLastFiniteCommandForFiveTicksThenRampsDown) {
   }
   EXPECT_EQ(command.kp.norm(), 0.0);
   EXPECT_DOUBLE_EQ(command.kd[0], robot->joints[0].kd);
+}
+
+TEST_F(Guarded, HoldsAsLongAndRampsAsSlowlyWhereItActsTwiceATick) {
+  auto twice = std::make_unique<Offset>(offset, calls);
+  twice->acts = 2;
+  controller = make_guarded(std::move(twice), robot);
+  EXPECT_EQ(controller->acts_per_tick(), 2);
+  controller->reset(state);
+  act();
+  offset = kNan;
+  for (int call = 0; call < 2 * kGuardHeldTicks; ++call) act();
+  EXPECT_FALSE(controller->faults().stopped);
+  act();
+  EXPECT_TRUE(controller->faults().stopped);
+  for (int call = 1; call < 2 * kGuardRampTicks; ++call) act();
+  EXPECT_GT(command.kp[0], 0.0);
+  act();
+  EXPECT_EQ(command.kp[0], 0.0);
 }
 
 TEST_F(Guarded, StaysStoppedUntilReset) {

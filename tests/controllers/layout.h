@@ -77,4 +77,25 @@ struct Layout {
   JointCommand command;
 };
 
+// The same told a velocity from outside, standing still at its robot's neutral pose.
+struct ToldLayout {
+  ToldLayout(const Descriptor& descriptor, std::shared_ptr<const VelocityCommand> told)
+      : robot(body(descriptor.robot)), state(robot->standing_state()), reference{state.X_WB, state.q} {
+    std::vector<Port> inputs = {{"x", descriptor.input_size(descriptor.observation.inputs[0])}};
+    auto network = std::make_unique<FakeNetwork>(inputs, std::vector<Port>{{"y", descriptor.actions()}}, *memory);
+    controller = make_descriptor_controller(descriptor, robot, std::move(network), "fake", {}, std::move(told));
+    controller->reset(state);
+  }
+  void act() const {
+    JointCommand command;
+    controller->act(state, reference, command);
+  }
+
+  std::shared_ptr<const RobotModel> robot;
+  RobotState state;
+  Reference reference;
+  std::unique_ptr<FakeMemory> memory = std::make_unique<FakeMemory>();
+  std::unique_ptr<Controller> controller;
+};
+
 }  // namespace duet::test

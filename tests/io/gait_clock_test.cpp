@@ -58,6 +58,13 @@ TEST(GaitClock, HoldsWhileItStandsAndStartsAgain) {
   EXPECT_NEAR(gait_angle(free, 0, 9, gate), 0.5 + 2.0 * kPi * 0.18, kNear);
 }
 
+TEST(GaitClock, TurnsBySecondsWhateverItsTicksAre) {
+  const GaitClock clock{.frequency_hz = 1.25, .phases = {0.5}};
+  const StandGate gate;
+  for (const double period : {0.01, 0.02, 0.04})
+    EXPECT_NEAR(gait_angle(clock, 0, std::lround(0.4 / period), gate, period), kPi + 0.5, kNear) << period;
+}
+
 TEST(GaitClock, TakesTheStanceForTheFirstHalfOfTheWave) {
   const StandGate gate;
   // Pairs of parts of a turn and parts of the wave.

@@ -48,8 +48,8 @@ struct Stage {
   std::shared_ptr<const RobotModel> robot = test::g1();
   RobotState start = robot->standing_state();
 
-  [[nodiscard]] Disturbance disturbance(const std::string& yaml, std::uint64_t seed = 1) const {
-    return {test::perturbation(yaml), *robot, start, kSteps, 0.002, seed};
+  [[nodiscard]] Disturbance disturbance(const std::string& yaml, std::uint64_t seed = 1, int acts = 1) const {
+    return {test::perturbation(yaml), *robot, start, kSteps / acts, acts, 0.002, seed};
   }
   // The state whose first joint says when it was.
   [[nodiscard]] RobotState at(double time) const {
@@ -94,6 +94,25 @@ TEST(Disturbance, LatencyIsToThePhysicsStep) {
         const int since = tick * kSteps + step - late;
         const double expected = since < 0 ? stage.start.q[5] : 100.0 + since / kSteps;
         ASSERT_EQ(lagging.in_effect(step).q_target[5], expected) << late << " " << tick << " " << step;
+      }
+    }
+  }
+}
+
+// A controller that acts twice a tick: delays are of ticks and latencies of milliseconds all the same.
+TEST(Disturbance, DelaysAndLatenciesKnowHowOftenTheControllerActs) {
+  const Stage stage;
+  Disturbance late = stage.disturbance("{delay: {ticks: 3}}", 1, 2);
+  for (int act = 0; act < 40; ++act)
+    EXPECT_EQ(late.seen(stage.at(100.0 + act)).q[0], act < 6 ? stage.start.q[0] : 100.0 + act - 6) << act;
+  for (const int lag : {1, 4, 5, 13}) {
+    Disturbance lagging = stage.disturbance("{latency: {ms: " + std::to_string(2 * lag) + "}}", 1, 2);
+    for (int act = 0; act < 12; ++act) {
+      lagging.send(stage.command(100.0 + act));
+      for (int step = 0; step < kSteps / 2; ++step) {
+        const int since = act * kSteps / 2 + step - lag;
+        const double expected = since < 0 ? stage.start.q[5] : 100.0 + since / (kSteps / 2);
+        ASSERT_EQ(lagging.in_effect(step).q_target[5], expected) << lag << " " << act << " " << step;
       }
     }
   }

@@ -146,7 +146,9 @@ class FaultyController final : public Controller {
     command = robot_.default_command(robot_.neutral);
   }
   [[nodiscard]] ControllerFaults faults() const override { return {3, 2, true}; }
+  [[nodiscard]] int acts_per_tick() const override { return acts; }
   std::vector<double> seen;
+  int acts = 1;
 
  private:
   const RobotModel& robot_;
@@ -170,6 +172,33 @@ TEST(Rollout, FaultsAndTheDelayedStateAreTheControllers) {
   for (size_t t = 2; t < controller.seen.size(); ++t)
     ASSERT_EQ(controller.seen[t], rollout.recording.robot[t - 2].X_WB.p.x()) << t;
   EXPECT_EQ(controller.seen[1], setup.start.X_WB.p.x());
+}
+
+TEST(Rollout, AControllerActsAsOftenInATickAsItSaysAndSeesWhatIsBetween) {
+  if (!is_available("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  Suite suite = test::playback_suite();
+  suite.engines = {"mujoco"};
+  const Parts parts(suite);
+  const RolloutSetup setup = parts.setup();
+  const auto policy = make_policy("replay", parts.robot);
+  const auto roll_with = [&](int acts) {
+    const auto backend = make_backend("mujoco", parts.experiment->scene(parts.spec));
+    FaultyController controller(*parts.robot);
+    controller.acts = acts;
+    const Rollout rollout = roll_out(setup, *backend, controller, *policy);
+    return std::pair(controller.seen, rollout.recording.robot);
+  };
+  const auto [seen, recorded] = roll_with(2);
+  ASSERT_EQ(seen.size(), 2 * recorded.size());
+  int between = 0;
+  for (size_t t = 0; t + 1 < recorded.size(); ++t) {
+    const double now = recorded[t].X_WB.p.x(), next = recorded[t + 1].X_WB.p.x();
+    ASSERT_EQ(seen[2 * t], now) << t;
+    between += (seen[2 * t + 1] - now) * (next - seen[2 * t + 1]) > 0.0 ? 1 : 0;
+  }
+  EXPECT_GT(between, static_cast<int>(recorded.size()) / 2);
+  EXPECT_EQ(roll_with(1).first.size(), roll_with(1).second.size());
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { roll_with(3); }));
 }
 
 // Gives the replay's plans, but the second one.
