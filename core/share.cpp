@@ -53,6 +53,18 @@ std::string share_file(std::string_view what, std::string_view relative) {
   return first_existing(what, places);
 }
 
+std::vector<std::string> published_places(const std::string& folder, const std::string& name) {
+  const auto setting = [](const char* variable) {
+    const char* value = std::getenv(variable);
+    return fs::path(value == nullptr ? "" : value);
+  };
+  std::vector<std::string> places = {(fs::path(folder) / name).string()};
+  if (const fs::path models = setting("DUET_MODELS"); !models.empty()) places.push_back((models / name).string());
+  if (const fs::path shared = setting("DUET_SHARED"); !shared.empty())
+    for (const char* part : {"models", "arena"}) places.push_back((shared / part / name).string());
+  return places;
+}
+
 std::string first_existing(std::string_view what, const std::vector<std::string>& places) {
   std::error_code ignored;
   for (const std::string& place : places)

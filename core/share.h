@@ -22,6 +22,10 @@ std::string program_file();
 // The folders that share_file looks in, in its order.
 std::vector<std::string> share_folders();
 
+// Where a file of others is looked for that does not ship, by its name with folders: in `folder`, in $DUET_MODELS, in
+// $DUET_SHARED/models and $DUET_SHARED/arena.
+std::vector<std::string> published_places(const std::string& folder, const std::string& name);
+
 // The first of `places` that exists; throws MissingError naming them all where none does.
 std::string first_existing(std::string_view what, const std::vector<std::string>& places);
 

@@ -12,6 +12,7 @@
 #include "duet/core/names.h"
 #include "duet/core/recording.h"
 #include "duet/core/require.h"
+#include "duet/core/share.h"
 #include "duet/robots/card.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/robot_model.h"
@@ -392,13 +393,22 @@ std::string dynamics_note(const RobotModel& robot, const UrdfModel& urdf, const 
       file, joints, damping, friction);
 }
 
+// The URDF of a card: beside it, or, where that may not be passed on, where files of others are.
+std::string urdf_of(const std::string& card_path, const RobotCard& card) {
+  const std::vector<std::string> places =
+      published_places(std::filesystem::path(card_path).parent_path().string(), card.urdf);
+  std::error_code ignored;
+  for (const std::string& place : places)
+    if (std::filesystem::exists(place, ignored)) return place;
+  return places.front();
+}
+
 }  // namespace
 
 RobotModel load_robot(const std::string& card_path, const std::string& urdf_path) {
   const std::string card_text = read_text(card_path);
   const RobotCard card = parse_card(card_text, card_path);
-  const std::string path =
-      urdf_path.empty() ? (std::filesystem::path(card_path).parent_path() / card.urdf).string() : urdf_path;
+  const std::string path = urdf_path.empty() ? urdf_of(card_path, card) : urdf_path;
   const std::string urdf_text = read_text(path);
   const UrdfModel urdf = parse_urdf(urdf_text, path);
   RobotModel model = Loader(card, card_path, urdf, path).load();
@@ -409,8 +419,7 @@ RobotModel load_robot(const std::string& card_path, const std::string& urdf_path
 std::vector<std::string> robot_notes(const std::string& card) {
   const std::string path = card_path(card);
   const RobotModel robot = load_robot(path);
-  const std::string file =
-      (std::filesystem::path(path).parent_path() / parse_card(read_text(path), path).urdf).string();
+  const std::string file = urdf_of(path, parse_card(read_text(path), path));
   std::vector<std::string> notes;
   if (const double away = urdf_origin(robot).norm(); away > 0.0)
     notes.push_back(

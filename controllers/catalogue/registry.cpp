@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <utility>
@@ -120,7 +119,15 @@ constexpr Entry kControllers[] = {{"pd", pd_info, load_pd, no_files},
                                   {"falcon_dec_loco", published_info, load_published, published_files},
                                   {"unitree_rl_lab", published_info, load_published, published_files},
                                   {"unitree_rl_mjlab", published_info, load_published, published_files},
-                                  {"rl_sar_dance", published_info, load_published, published_files}};
+                                  {"rl_sar_dance", published_info, load_published, published_files},
+                                  {"g1_deploy_velocity", published_info, load_published, published_files},
+                                  {"g1_deploy_amp", published_info, load_published, published_files},
+                                  {"spinkick", published_info, load_published, published_files},
+                                  {"booster_gym", published_info, load_published, published_files},
+                                  {"playground_t1", published_info, load_published, published_files},
+                                  {"rl_gym_h1", published_info, load_published, published_files},
+                                  {"rl_gym_h1_2", published_info, load_published, published_files},
+                                  {"humanoid_gym", published_info, load_published, published_files}};
 // A name that is the path of an IO descriptor.
 constexpr Entry kDescriptor = {"", published_info, load_published, published_files};
 
@@ -251,19 +258,8 @@ JointGains standing_gains(const std::string& name, const std::shared_ptr<const R
 
 namespace {
 
-std::string setting(const char* name) {
-  const char* value = std::getenv(name);
-  return value == nullptr ? "" : value;
-}
-
 std::vector<std::string> network_places(const Descriptor& descriptor) {
-  namespace fs = std::filesystem;
-  std::vector<std::string> places = {(fs::path(descriptor.file).parent_path() / descriptor.network).string()};
-  if (const std::string models = setting("DUET_MODELS"); !models.empty())
-    places.push_back((fs::path(models) / descriptor.network).string());
-  if (const std::string shared = setting("DUET_SHARED"); !shared.empty())
-    places.push_back((fs::path(shared) / "models" / descriptor.network).string());
-  return places;
+  return published_places(std::filesystem::path(descriptor.file).parent_path().string(), descriptor.network);
 }
 
 }  // namespace

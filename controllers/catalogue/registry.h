@@ -63,7 +63,7 @@ void register_controller(const ControllerInfo& info, ControllerMaker make);
 // one that is not there, InputError for one that is broken.
 Descriptor load_descriptor(const std::string& name);
 
-// The file that the option `network` names; else the descriptor's: beside it, in $DUET_MODELS, in $DUET_SHARED/models.
+// The file that the option `network` names; else the descriptor's, from its folder (published_places of core/share.h).
 // Throws MissingError naming the places.
 std::string find_network(const Descriptor& descriptor, const ControllerOptions& options = {});
 

@@ -15,9 +15,15 @@
 
 namespace duet::test {
 
+// A file of the shared data by the name under which descriptors and cards look for it; "": absent.
+inline std::string published_file(const std::string& name) {
+  const std::string model = shared_file("models/" + name);
+  return model.empty() ? shared_file("arena/" + name) : model;
+}
+
 // With the network of the shared data.
 inline WalkSetup published(const std::string& name) {
-  return {.controller = name, .options = {{"network", shared_file("models/" + load_descriptor(name).network)}}};
+  return {.controller = name, .options = {{"network", published_file(load_descriptor(name).network)}}};
 }
 
 // HOMIE under a velocity command, or one with a height; "": under the root of the reference commands.
@@ -109,11 +115,11 @@ inline WalkSetup tracked(const std::string& name, RobotMotion motion) {
 }
 
 // The motion that BeyondMimic's network was trained on: its outputs beside the action, by time_step.
-inline RobotMotion beyond_mimic_motion(int frames) {
+inline RobotMotion beyond_mimic_motion(int frames, const std::string& controller = "beyond_mimic") {
   const auto robot = body("g1");
-  const Descriptor descriptor = load_descriptor("beyond_mimic");
-  const auto network = load_network(shared_file("models/" + descriptor.network));
-  std::vector<float> obs(160), step(1);
+  const Descriptor descriptor = load_descriptor(controller);
+  const auto network = load_network(published_file(descriptor.network));
+  std::vector<float> obs(network->inputs()[0].size), step(1);
   std::vector<std::vector<float>> values;
   for (const Port& port : network->outputs()) values.emplace_back(port.size);
   const std::span<const float> inputs[] = {obs, step};

@@ -19,7 +19,8 @@ struct WalkSetup {
   ControllerOptions options = {};
   std::string engine = "mujoco";
   EngineOptions engine_options = {};
-  std::string card = {};  // "": the controller's own
+  std::string card = {};                         // "": the controller's own
+  std::shared_ptr<const RobotModel> robot = {};  // instead of the card's
   double seconds = 10.0;
   double friction = 0.8;
   Eigen::VectorXd start = {};  // joints; empty: the card's neutral pose with the arms as in `arms`
@@ -42,7 +43,9 @@ inline bool stands(const RobotState& state) { return !has_fallen(state, {0.3, 0.
 
 inline Walk walk(const WalkSetup& setup) {
   Scene scene;
-  scene.robot = body(setup.card.empty() ? controller_info(setup.controller).robot : setup.card);
+  scene.robot = setup.robot != nullptr
+                    ? setup.robot
+                    : body(setup.card.empty() ? controller_info(setup.controller).robot : setup.card);
   scene.partner = PartnerMode::kNone;
   scene.friction.robot_ground = setup.friction;
   scene.options = setup.engine_options;
@@ -70,9 +73,13 @@ inline Walk walk(const WalkSetup& setup) {
     }
     controller->act(now, reference, command);
     if (setup.act_on) setup.act_on(tick, *backend);
-    const auto same = [&](int) -> const JointCommand& { return command; };
+    const int steps = steps_per_tick(scene.dt), steps_per_act = steps / controller->acts_per_tick();
+    const auto at_its_rate = [&](int i) -> const JointCommand& {
+      if (i > 0 && i % steps_per_act == 0) controller->act(backend->state(), reference, command);
+      return command;
+    };
     const auto upright = [&](int) { return stands(backend->state()); };
-    result.upright = step_control_period(*backend, steps_per_tick(scene.dt), same, upright) == Outcome::kOk;
+    result.upright = step_control_period(*backend, steps, at_its_rate, upright) == Outcome::kOk;
   }
   for (double* mean : {&result.forward, &result.yaw_rate, &result.height}) *mean /= std::max(measured, 1);
   result.joint_rms = std::sqrt(squares / std::max(ticks, 1));
