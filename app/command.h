@@ -81,7 +81,8 @@ void add_attribute(CLI::App& app, Session& session);
 void add_blame(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
 void add_bless(CLI::App& app, Session& session);
-void add_policy_check(CLI::App& app, Session& session);  // `policy check`
+void add_policy_check(CLI::App& app, Session& session);       // `policy check`
+void add_controller_import(CLI::App& app, Session& session);  // `controller import`
 void add_publish(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_verify(CLI::App& app, Session& session);

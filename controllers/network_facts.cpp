@@ -9,9 +9,30 @@
 #include <utility>
 
 #include "duet/controllers/descriptor_controller.h"
+#include "duet/controllers/metadata.h"
 #include "duet/core/require.h"
 
 namespace duet {
+
+std::vector<std::string> metadata_words(const std::string& text) {
+  std::vector<std::string> words;
+  std::string word;
+  for (const char c : text + ",") {
+    const bool apart = std::string_view(",;[](){}\"'").find(c) != std::string_view::npos ||
+                       std::isspace(static_cast<unsigned char>(c)) != 0;
+    if (!apart) word += c;
+    if (apart && !word.empty()) words.push_back(std::exchange(word, {}));
+  }
+  return words;
+}
+
+std::string plain_joint(std::string name) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return c == '-' ? '_' : std::tolower(c); });
+  for (const std::string_view end : {"_joint", "_link"})
+    if (name.ends_with(end)) name.erase(name.size() - end.size());
+  return name;
+}
+
 namespace {
 
 using Metadata = std::map<std::string, std::string>;
@@ -27,19 +48,6 @@ constexpr std::string_view kPoseKeys[] = {"default_joint_pos",    "default_joint
 constexpr std::string_view kScaleKeys[] = {"action_scale", "action_scales"};
 
 constexpr double kMetadataRounding = 6.0e-4, kMetadataShare = 0.01;  // of numbers that agree: 3 decimals, and 1 %
-
-// "a,b", ["a", "b"], (a b): the words between commas, brackets, quotes and spaces.
-Words metadata_words(const std::string& text) {
-  Words words;
-  std::string word;
-  for (const char c : text + ",") {
-    const bool apart = std::string_view(",;[](){}\"'").find(c) != std::string_view::npos ||
-                       std::isspace(static_cast<unsigned char>(c)) != 0;
-    if (!apart) word += c;
-    if (apart && !word.empty()) words.push_back(std::exchange(word, {}));
-  }
-  return words;
-}
 
 struct MetadataEntry {
   std::string key;
@@ -57,15 +65,7 @@ std::optional<MetadataEntry> find_metadata(const Metadata& metadata, const std::
   return std::nullopt;
 }
 
-// A descriptor's joint under the name that the file may have for it: without case, "_joint", "-" for "_".
-std::string plain_joint(std::string name) {
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return c == '-' ? '_' : std::tolower(c); });
-  for (const std::string_view end : {"_joint", "_link"})
-    if (name.ends_with(end)) name.erase(name.size() - end.size());
-  return name;
-}
-
-Words plain_joint(Words names) {
+Words plain_joints(Words names) {
   for (std::string& name : names) name = plain_joint(name);
   return names;
 }
@@ -100,7 +100,7 @@ class FactComparison {
   void find_joints() {
     const std::optional<MetadataEntry> entry = find_metadata(metadata_, kJointKeys);
     if (!entry || entry->words.empty()) return;
-    names_ = plain_joint(entry->words);
+    names_ = plain_joints(entry->words);
     const std::vector<const DescriptorJoint*> joints = joints_of(names_.size());
     Words own;
     for (const DescriptorJoint* joint : joints) own.push_back(plain_joint(joint->name));

@@ -1,0 +1,75 @@
+// An IO descriptor as it is imported: what a file of a network's makers says, with the place that each part comes from.
+// Internal to controllers/import.
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "duet/controllers/descriptor.h"
+#include "duet/robots/robot_model.h"
+
+namespace duet {
+
+using Metadata = std::map<std::string, std::string>;  // of an ONNX file, by key
+
+// A term of the makers' observation, as channels of a descriptor: "base_angular_velocity, scale: 0.25".
+struct DraftTerm {
+  std::string name;
+  std::vector<std::string> channels{};
+  int frames = 1;
+};
+
+struct Draft {
+  std::string kind;       // "holosoma", ...
+  std::string network{};  // file name that the file gives; "": none
+  double rate_hz = kTickRate;
+  std::vector<DescriptorJoint> joints{};          // in the network's order
+  std::vector<DraftTerm> terms{};                 // in the order of the input
+  bool frame_major = false, starts_full = false;  // of its history
+  bool frames_seen = false, has_clock = false;    // whether a term has a history, a clock
+  double action_clip = std::numeric_limits<double>::infinity();
+  std::optional<VelocityInterface> command{};
+  std::map<std::string, std::string> from{};  // by key of the descriptor: the place that it comes from
+  std::vector<std::string> assumed{};         // sentences
+};
+
+// A card that has all of a network's joints.
+struct DraftBody {
+  std::string card;  // name or path
+  std::shared_ptr<const RobotModel> robot;
+};
+
+// What changes a term's channels.
+struct TermFacts {
+  std::vector<double> scale = {1.0};
+  double clip = std::numeric_limits<double>::infinity();
+  std::string clock{};                // keys of a gait's clock: "frequency_hz: 1, ..."
+  std::string anchor = "torso_link";  // frame of a tracker's errors
+  bool clipped = false;               // of the previous action
+};
+
+// The channels of a term under any of its makers' names. Throws InputError with the nearest and all known names.
+DraftTerm draft_term(const std::string& name, const TermFacts& facts, const std::string& file);
+
+// The body of joints under the makers' names: the card asked for, else the first that has all of them, the one with the
+// fewest others. Throws InputError where none has.
+DraftBody body_of(const std::vector<std::string>& joints, const std::string& card, const std::string& file);
+// The body of so many joints whose file names none: the card asked for, else the first of as many.
+DraftBody body_of(std::size_t joints, const std::string& card, const std::string& file);
+// The robot's joint under a maker's name: without case, "_joint", "-" for "_"; -1: none.
+int joint_of(const RobotModel& robot, const std::string& name);
+
+// The draft of what an ONNX file says of itself. Throws InputError where it says too little, and of what.
+Draft draft_of_metadata(const Metadata& metadata, const std::string& file, const std::string& card);
+
+// The draft of a deployment's YAML; `metadata`: of its network, for the names of joints where it has none.
+Draft draft_of_deployment(const YAML::Node& document, const std::string& file, const std::string& card,
+                          const Metadata& metadata);
+
+}  // namespace duet

@@ -1,0 +1,15 @@
+// Words of what networks' files say of themselves: lists of joints and numbers, as makers spell them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace duet {
+
+// "a,b", ["a", "b"], (a b): the words between commas, brackets, quotes and spaces.
+std::vector<std::string> metadata_words(const std::string& text);
+
+// A joint's name without case, "_joint", "_link", "-" for "_": the same joint under the names of two makers.
+std::string plain_joint(std::string name);
+
+}  // namespace duet
