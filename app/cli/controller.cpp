@@ -31,7 +31,8 @@ void run_import(Session& session, ImportRequest request, const std::string& outp
          {"descriptor", made.text},
          {"assumed", made.assumed},
          {"found", made.found}});
-  if (!output.empty()) suggest_next(session, fmt::format("duet walk --controllers {}", output));
+  if (!output.empty())
+    suggest_next(session, fmt::format("duet run walk -s controllers=[{}] -o runs/{}", output, made.name));
 }
 
 }  // namespace
