@@ -66,7 +66,7 @@ TEST(EngineInterface, IsOneNumberInOneProgram) { EXPECT_EQ(engine_interface(), E
 
 // The modules of this test stand in folders of their own.
 TEST(EngineFolders, AModuleThatWasCompiledAgainstOtherTypesIsRefusedByOneSentence) {
-  setenv("DUET_ENGINES", (std::string(DUET_STRANGE_ENGINES) + ":" + DUET_BUILT_ENGINES).c_str(), 1);
+  setenv("DUET_ENGINES", DUET_STRANGE_ENGINES ":" DUET_BUILT_ENGINES, 1);
   Scene scene;
   scene.robot = test::sledge();
   const std::string message = test::thrown_message<MissingError>([&] { make_backend("stranger", scene); });

@@ -20,6 +20,7 @@
 #include <dart/dynamics/SphereShape.hpp>
 #include <dart/dynamics/WeldJoint.hpp>
 #include <dart/simulation/World.hpp>
+#include <mutex>
 
 #include "own_world.h"
 
@@ -42,6 +43,18 @@ Eigen::Isometry3d isometry(const duet::Pose& pose) {
 int link_of(const dart::collision::CollisionObject* object, const dd::Skeleton* robot) {
   const dd::ShapeNode* node = object->getShapeFrame()->asShapeNode();
   return node->getSkeleton().get() != robot ? -1 : static_cast<int>(node->getBodyNodePtr()->getIndexInSkeleton());
+}
+
+// DART's detector initialises ODE when it is made and closes it when it goes, by a count that no lock guards: one world
+// at a time does either, and one detector stays.
+std::mutex& of_detectors() {
+  static std::mutex mutex;
+  return mutex;
+}
+dart::collision::CollisionDetectorPtr make_detector() {
+  const std::lock_guard lock(of_detectors());
+  static const auto stays = dart::collision::OdeCollisionDetector::create();
+  return dart::collision::OdeCollisionDetector::create();
 }
 
 using MayTouch = std::function<bool(int, int)>;
@@ -159,7 +172,7 @@ class DartOwn final : public own::OwnWorld {
       world_->setConstraintSolver(std::make_unique<Solver>(dantzig, pgs));
     else
       world_->setConstraintSolver(std::make_unique<Solver>(pgs, nullptr));
-    world_->getConstraintSolver()->setCollisionDetector(dart::collision::OdeCollisionDetector::create());
+    world_->getConstraintSolver()->setCollisionDetector(make_detector());
     make_ground();
     skeleton_ = dd::Skeleton::create("robot");
     for (int link = 0; link <= n_; ++link) make_link(link);
@@ -173,6 +186,15 @@ class DartOwn final : public own::OwnWorld {
     if (scene.partner == duet::PartnerMode::kSolid) make_partner();
     place();
   }
+
+  ~DartOwn() override {
+    const std::lock_guard lock(of_detectors());
+    robot_group_.reset();
+    partner_group_.reset();
+    world_.reset();
+  }
+  DartOwn(const DartOwn&) = delete;
+  DartOwn& operator=(const DartOwn&) = delete;
 
   [[nodiscard]] std::string_view name() const override { return "dart_own"; }
   [[nodiscard]] std::string version() const override { return DART_VERSION; }

@@ -33,21 +33,23 @@ constexpr int kPointsOfAPair = 4;
 }
 void say_nothing(int, const char*, va_list) {}
 
-// ODE's handlers are of the process, its data of each thread.
+// ODE's handlers are of the process: set as the module is loaded, before threads could race for ODE's own count.
+struct Library {
+  Library() {
+    dInitODE2(0);
+    dSetErrorHandler(fail);
+    dSetDebugHandler(fail);
+    dSetMessageHandler(say_nothing);
+  }
+};
+const Library kLibrary;
+
+// Its data are of each thread.
 void enter() {
-  struct Library {
-    Library() {
-      dInitODE2(0);
-      dSetErrorHandler(fail);
-      dSetDebugHandler(fail);
-      dSetMessageHandler(say_nothing);
-    }
-  };
   struct ThreadData {
     ThreadData() { dAllocateODEDataForThread(dAllocateMaskAll); }
     ~ThreadData() { dCleanupODEAllDataForThread(); }
   };
-  static const Library library;
   thread_local const ThreadData data;
 }
 
