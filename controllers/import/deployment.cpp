@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numeric>
 
 #include "duet/controllers/import/draft.h"
 #include "duet/controllers/metadata.h"
@@ -13,6 +14,8 @@
 
 namespace duet {
 namespace {
+
+constexpr int kMostJoints = 200, kMostFrames = 1000;  // of a robot; of a history
 
 class DeploymentReader {
  public:
@@ -48,25 +51,35 @@ class DeploymentReader {
       refuse(fmt::format("finite numbers in '{}'", key), "others");
     return values;
   }
+  // A whole number, which a file may write as 2.0.
+  [[nodiscard]] int whole(double value, int least, int most, const char* key) const {
+    if (!(value >= least && value <= most && value == std::floor(value)))
+      refuse(fmt::format("a whole number from {} to {} in '{}'", least, most, key), fmt::format("{:g}", value));
+    return static_cast<int>(value);
+  }
+  // Which motor each of the network's joints is.
+  [[nodiscard]] std::vector<int> motors_of(const YAML::Node& in, const char* key) const {
+    const std::vector<double> map = numbers(in, key, 0);
+    if (map.empty()) refuse(fmt::format("numbers in '{}'", key), "none");
+    std::vector<int> motors;
+    motors.reserve(map.size());
+    for (const double motor : map) motors.push_back(whole(motor, 0, static_cast<int>(map.size()) - 1, key));
+    return motors;
+  }
   [[nodiscard]] double number_or(const YAML::Node& in, const char* key, double other) const {
     return in[key] && in[key].IsScalar() ? in[key].as<double>() : other;
   }
 
   // The robot's joints in the network's order: `map` says which of its motors each is.
-  void set_joints(Draft& draft, const std::vector<double>& map, const std::vector<std::string>& names,
-                  const char* map_key) {
+  void set_joints(Draft& draft, const std::vector<int>& map, const std::vector<std::string>& names) {
     const DraftBody body = names.empty() ? body_of(map.size(), card_, file_) : body_of(names, card_, file_);
     if (names.empty())
       draft.assumed.push_back(
           fmt::format("the robot is '{}' and motors are numbered as its joints: the file names none", body.card));
-    for (std::size_t i = 0; i < map.size(); ++i) {
-      const double place = map[i];
-      if (place < 0.0 || place >= static_cast<double>(map.size()) || place != std::floor(place))
-        refuse(fmt::format("whole numbers below {} in '{}'", map.size(), map_key), fmt::format("{:g}", place));
+    for (const int motor : map) {
       DescriptorJoint joint;
-      joint.name = names.empty()
-                       ? body.robot->joints[static_cast<std::size_t>(place)].name
-                       : body.robot->joints[joint_of(*body.robot, names[static_cast<std::size_t>(place)])].name;
+      joint.name =
+          names.empty() ? body.robot->joints[motor].name : body.robot->joints[joint_of(*body.robot, names[motor])].name;
       joint.action = 1.0;
       draft.joints.push_back(joint);
     }
@@ -80,13 +93,13 @@ class DeploymentReader {
 
   Draft isaac_lab() {
     Draft draft{.kind = "IsaacLab or mjlab", .network = "policy.onnx", .starts_full = true};
-    const std::vector<double> map = numbers(root_, "joint_ids_map", 0);
+    const std::vector<int> map = motors_of(root_, "joint_ids_map");
     std::vector<std::string> motors(map.size());  // names by motor, where the network's file has names
     if (const std::vector<std::string> names = metadata_joints(); names.size() == map.size())
-      for (std::size_t i = 0; i < map.size(); ++i) motors.at(static_cast<std::size_t>(map[i])) = names[i];
+      for (std::size_t i = 0; i < map.size(); ++i) motors[map[i]] = names[i];
     else
       motors.clear();
-    set_joints(draft, map, motors, "joint_ids_map");
+    set_joints(draft, map, motors);
     const YAML::Node action = root_["actions"]["JointPositionAction"];
     if (!action) refuse("'actions' of the kind JointPositionAction", "others");
     const std::size_t n = map.size();
@@ -95,7 +108,7 @@ class DeploymentReader {
     const std::vector<double> offset =
         action["offset"] && !action["offset"].IsNull() ? numbers(action, "offset", n) : pose;
     for (std::size_t i = 0; i < n; ++i) {
-      const auto motor = static_cast<std::size_t>(map[i]);
+      const int motor = map[i];
       DescriptorJoint& joint = draft.joints[i];
       joint.kp = kp[motor];
       joint.kd = kd[motor];
@@ -131,6 +144,8 @@ class DeploymentReader {
       const YAML::Node term = entry.second;
       if (!term.IsMap()) refuse(fmt::format("a mapping for the term '{}'", name), describe(term));
       TermFacts facts;
+      if (const auto anchor = metadata_.find("anchor_body_name"); anchor != metadata_.end())
+        facts.anchor = anchor->second;
       if (term["scale"] && !term["scale"].IsNull()) facts.scale = numbers(term, "scale", 0);
       if (const YAML::Node clip = term["clip"]; clip && clip.IsSequence() && clip.size() == 2)
         facts.clip = std::max(std::abs(clip[0].as<double>()), std::abs(clip[1].as<double>()));
@@ -138,7 +153,7 @@ class DeploymentReader {
         facts.clock = fmt::format("frequency_hz: {:.17g}, standing: zero, after_standing: runs_on",
                                   1.0 / params["period"].as<double>());
       draft.terms.push_back(draft_term(name, facts, file_));
-      draft.terms.back().frames = static_cast<int>(number_or(term, "history_length", 1.0));
+      draft.terms.back().frames = whole(number_or(term, "history_length", 1.0), 0, kMostFrames, "history_length");
       draft.frames_seen |= draft.terms.back().frames > 1;
       draft.has_clock |= !facts.clock.empty();
     }
@@ -186,13 +201,13 @@ class DeploymentReader {
   Draft rl_sar() {
     const YAML::Node config = root_.begin()->second, robot = base();
     Draft draft{.kind = "rl_sar", .network = config["model_name"] ? config["model_name"].as<std::string>() : ""};
-    const std::vector<double> map = numbers(config, "joint_mapping", 0);
+    const std::vector<int> map = motors_of(config, "joint_mapping");
     const std::size_t n = map.size();
     std::vector<std::string> names;
     if (robot && robot["joint_names"])
       for (const YAML::Node& name : robot["joint_names"]) names.push_back(name.as<std::string>());
     if (names.size() != n) names.clear();
-    set_joints(draft, map, names, "joint_mapping");
+    set_joints(draft, map, names);
     const std::vector<double> kp = numbers(config, "rl_kp", n), kd = numbers(config, "rl_kd", n),
                               pose = numbers(config, "default_dof_pos", n), scale = numbers(config, "action_scale", n),
                               low = numbers(config, "clip_actions_lower", n),
@@ -252,13 +267,13 @@ class DeploymentReader {
     Draft draft{.kind = "unitree_rl_gym"};
     if (root_["policy_path"])
       draft.network = std::filesystem::path(root_["policy_path"].as<std::string>()).filename().string();
-    const auto n = static_cast<std::size_t>(number_or(root_, "num_actions", 0.0));
-    std::vector<double> map;
-    for (std::size_t i = 0; i < n; ++i) map.push_back(static_cast<double>(i));
-    set_joints(draft, map, {}, "num_actions");
+    const int n = whole(number_or(root_, "num_actions", 0.0), 1, kMostJoints, "num_actions");
+    std::vector<int> map(n);
+    std::iota(map.begin(), map.end(), 0);
+    set_joints(draft, map, {});
     const std::vector<double> kp = numbers(root_, "kps", n), kd = numbers(root_, "kds", n),
                               pose = numbers(root_, "default_angles", n), scale = numbers(root_, "action_scale", n);
-    for (std::size_t i = 0; i < n; ++i) {
+    for (int i = 0; i < n; ++i) {
       draft.joints[i].kp = kp[i];
       draft.joints[i].kd = kd[i];
       draft.joints[i].neutral = pose[i];
@@ -301,8 +316,6 @@ Draft draft_of_deployment(const YAML::Node& document, const std::string& file, c
     return DeploymentReader(document, file, card, metadata).read();
   } catch (const YAML::Exception& error) {
     throw InputError(fmt::format("'{}': {}", file, error.what()));
-  } catch (const std::out_of_range&) {
-    throw InputError(fmt::format("'{}': expected whole numbers below the number of joints in 'joint_ids_map'", file));
   }
 }
 

@@ -16,6 +16,7 @@
 #include "duet/core/require.h"
 #include "duet/nn/catalogue/load_network.h"
 #include "duet/robots/robot_cards.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {
@@ -100,9 +101,9 @@ class Importer {
       shown += size * term.frames;
       sizes.push_back(fmt::format("{} {}", term.name, size));
     }
-    const auto fits = [&](const Port& port) { return port.size == shown || port.size % frame == 0; };
+    const auto fits = [&](const Port& port) { return port.size == shown || (frame > 0 && port.size % frame == 0); };
     const auto input = std::ranges::find_if(sample_->inputs(), fits);
-    if (input == sample_->inputs().end() || frame == 1) refuse_sizes(sizes, shown);
+    if (input == sample_->inputs().end() || frame <= 1) refuse_sizes(sizes, shown);
     if (input->size != shown) take_history(*input, frame, shown, sizes);
     if (sample_->inputs().size() > 1) input_ = input->name;
     for (const Port& port : sample_->inputs())

@@ -44,6 +44,7 @@ const std::vector<TermRow>& term_table() {
 }
 
 std::string scale_text(const std::vector<double>& scale) {
+  if (scale.empty()) return "";
   const bool one = std::ranges::all_of(scale, [&](double value) { return value == scale.front(); });
   if (one && scale.front() == 1.0) return "";
   return one ? fmt::format(", scale: {:.9g}", scale.front()) : fmt::format(", scale: [{:.9g}]", fmt::join(scale, ", "));
@@ -78,7 +79,14 @@ DraftTerm draft_term(const std::string& name, const TermFacts& facts, const std:
       known.push_back(each);
       if (each != name) continue;
       DraftTerm term{.name = name};
-      for (const char* channel : row.channels) term.channels.push_back(channel_text(channel, facts));
+      for (const char* channel : row.channels) {
+        if (std::string_view(channel).starts_with("anchor_") && facts.anchor.empty())
+          throw InputError(
+              fmt::format("'{}': term '{}': expected its body in the network's metadata "
+                          "('anchor_body_name'), found none",
+                          file, name));
+        term.channels.push_back(channel_text(channel, facts));
+      }
       return term;
     }
   }

@@ -49,9 +49,9 @@ struct DraftBody {
 struct TermFacts {
   std::vector<double> scale = {1.0};
   double clip = std::numeric_limits<double>::infinity();
-  std::string clock{};                // keys of a gait's clock: "frequency_hz: 1, ..."
-  std::string anchor = "torso_link";  // frame of a tracker's errors
-  bool clipped = false;               // of the previous action
+  std::string clock{};   // keys of a gait's clock: "frequency_hz: 1, ..."
+  std::string anchor{};  // frame of a tracker's errors
+  bool clipped = false;  // of the previous action
 };
 
 // The channels of a term under any of its makers' names. Throws InputError with the nearest and all known names.

@@ -33,7 +33,8 @@ bool is_told_velocities(const std::string& controller) {
   return !controller.empty() && has_descriptor(controller) && load_descriptor(controller).command.has_value();
 }
 
-Walker::Walker(const std::string& controller, const ControllerOptions& options, std::shared_ptr<const RobotModel> robot)
+Walker::Walker(const std::string& controller, const ControllerOptions& options,
+               const std::shared_ptr<const RobotModel>& robot)
     : Walker(std::move(*load(controller, options, robot)())) {}
 
 std::function<std::unique_ptr<Walker>()> Walker::load(const std::string& controller, const ControllerOptions& options,

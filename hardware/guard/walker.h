@@ -24,7 +24,8 @@ bool is_told_velocities(const std::string& controller);
 class Walker {
  public:
   // Throws as make_controller; std::invalid_argument for a controller that does not walk.
-  Walker(const std::string& controller, const ControllerOptions& options, std::shared_ptr<const RobotModel> robot);
+  Walker(const std::string& controller, const ControllerOptions& options,
+         const std::shared_ptr<const RobotModel>& robot);
   // Makes walkers, all of the files as they are now. Throws as the constructor. Thread-safe.
   static std::function<std::unique_ptr<Walker>()> load(const std::string& controller, const ControllerOptions& options,
                                                        const std::shared_ptr<const RobotModel>& robot);
