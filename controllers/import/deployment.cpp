@@ -76,6 +76,8 @@ class DeploymentReader {
     if (names.empty())
       draft.assumed.push_back(
           fmt::format("the robot is '{}' and motors are numbered as its joints: the file names none", body.card));
+    if (const std::vector<int>& arm = body.robot->roles.arms[0]; !arm.empty())
+      trunk_ = body.robot->links[body.robot->links[arm.front() + 1].parent].name;
     for (const int motor : map) {
       DescriptorJoint joint;
       joint.name =
@@ -87,6 +89,16 @@ class DeploymentReader {
   [[nodiscard]] std::vector<std::string> metadata_joints() const {
     const auto names = metadata_.find("joint_names");
     return names == metadata_.end() ? std::vector<std::string>{} : metadata_words(names->second);
+  }
+
+  // A tracker's errors are of the body that the network names, or else of the one that carries the arms.
+  void add_term(Draft& draft, const std::string& name, TermFacts facts) const {
+    const auto said = metadata_.find("anchor_body_name");
+    facts.anchor = said == metadata_.end() ? trunk_ : said->second;
+    draft.terms.push_back(draft_term(name, facts, file_));
+    if (said == metadata_.end() && name.find("anchor") != std::string::npos)
+      draft.assumed.push_back(
+          fmt::format("'{}' is of '{}', which carries the arms: the file does not say", name, trunk_));
   }
 
   // ---- unitree_rl_lab, mjlab
@@ -144,15 +156,13 @@ class DeploymentReader {
       const YAML::Node term = entry.second;
       if (!term.IsMap()) refuse(fmt::format("a mapping for the term '{}'", name), describe(term));
       TermFacts facts;
-      if (const auto anchor = metadata_.find("anchor_body_name"); anchor != metadata_.end())
-        facts.anchor = anchor->second;
       if (term["scale"] && !term["scale"].IsNull()) facts.scale = numbers(term, "scale", 0);
       if (const YAML::Node clip = term["clip"]; clip && clip.IsSequence() && clip.size() == 2)
         facts.clip = std::max(std::abs(clip[0].as<double>()), std::abs(clip[1].as<double>()));
       if (const YAML::Node params = term["params"]; params && params.IsMap() && params["period"])
         facts.clock = fmt::format("frequency_hz: {:.17g}, standing: zero, after_standing: runs_on",
                                   1.0 / params["period"].as<double>());
-      draft.terms.push_back(draft_term(name, facts, file_));
+      add_term(draft, name, facts);
       draft.terms.back().frames = whole(number_or(term, "history_length", 1.0), 0, kMostFrames, "history_length");
       draft.frames_seen |= draft.terms.back().frames > 1;
       draft.has_clock |= !facts.clock.empty();
@@ -252,7 +262,7 @@ class DeploymentReader {
       TermFacts facts{.clip = number_or(config, "clip_obs", 100.0), .clipped = true};
       for (const auto& [term, key] : scales)
         if (node.as<std::string>() == term) facts.scale = numbers(config, key, 0);
-      draft.terms.push_back(draft_term(node.as<std::string>(), facts, file_));
+      add_term(draft, node.as<std::string>(), facts);
       draft.terms.back().frames = static_cast<int>(std::max<std::size_t>(history.size(), 1));
       if (node.as<std::string>() == "commands") {
         draft.command = VelocityInterface{.forward = {-1, 1}, .lateral = {-1, 1}, .yaw = {-1, 1}};
@@ -306,6 +316,7 @@ class DeploymentReader {
   const std::string& file_;
   const std::string& card_;
   const Metadata& metadata_;
+  std::string trunk_;  // of the robot, "" where nothing carries arms
 };
 
 }  // namespace
