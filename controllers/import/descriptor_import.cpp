@@ -44,6 +44,8 @@ class Importer {
     require(request_.history.empty() || request_.history == "frames" || request_.history == "terms",
             "history: expected frames or terms, found '{}'", request_.history);
     read();
+    if (draft_.terms.empty())
+      throw InputError(fmt::format("'{}': expected terms of an observation, found none", request_.file));
     std::vector<std::string> joints;
     for (const DescriptorJoint& joint : draft_.joints) joints.push_back(joint.name);
     body_ = body_of(joints, request_.robot, request_.file);

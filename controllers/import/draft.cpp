@@ -122,7 +122,14 @@ DraftBody body_of(const std::vector<std::string>& joints, const std::string& car
 }
 
 DraftBody body_of(std::size_t joints, const std::string& card, const std::string& file) {
-  if (!card.empty()) return {card, load_shared_robot(card_path(card))};
+  if (!card.empty()) {
+    const auto robot = load_shared_robot(card_path(card));
+    if (robot->joints.size() != joints)
+      throw InputError(
+          fmt::format("'{}': expected {} joints, those of robot '{}', found {}: --robot gives another card", file,
+                      robot->joints.size(), card, joints));
+    return {card, robot};
+  }
   for (const RobotCardFile& each : robot_cards())
     if (const auto robot = load_quietly(each.path); robot != nullptr && robot->joints.size() == joints)
       return {each.name, robot};

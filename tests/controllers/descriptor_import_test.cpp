@@ -167,6 +167,18 @@ std::string lab_yaml(const std::string& more = "") {
          more;
 }
 
+TEST_F(ImportTest, ADeploymentOfAnotherNumberOfJointsOrOfWildNumbersIsRefused) {
+  EXPECT_SENTENCE(refusal({.file = write("deploy.yaml", lab_yaml()), .robot = "g1"}));
+  std::string wild = lab_yaml();
+  wild.replace(wild.find("[6, 7"), 2, "[1e300");
+  EXPECT_SENTENCE(refusal({.file = write("deploy.yaml", wild), .robot = "t1_12dof"}));
+  wild = lab_yaml();
+  EXPECT_SENTENCE(
+      refusal({.file = write("deploy.yaml", wild.substr(0, wild.find("observations")) + "observations: {}\n"),
+               .robot = "t1_12dof"}));
+  EXPECT_SENTENCE(refusal({.file = write("gym.yaml", "kps: [1]\nnum_obs: 3\nnum_actions: 1e12\n")}));
+}
+
 TEST_F(ImportTest, OfALabsDeploymentPutsItsMotorsInTheNetworksOrder) {
   write("policy.onnx", network(34, 12, {}));
   const ImportedDescriptor made = imported({.file = write("deploy.yaml", lab_yaml()), .robot = "t1_12dof"});
