@@ -1,10 +1,13 @@
 // Words of what networks' files say of themselves: lists of joints and numbers, as makers spell them.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
 namespace duet {
+
+using Metadata = std::map<std::string, std::string>;  // of an ONNX file, by key
 
 // "a,b", ["a", "b"], (a b): the words between commas, brackets, quotes and spaces.
 std::vector<std::string> metadata_words(const std::string& text);

@@ -35,7 +35,6 @@ std::string plain_joint(std::string name) {
 
 namespace {
 
-using Metadata = std::map<std::string, std::string>;
 using Words = std::vector<std::string>;
 
 // A key as any of the makers spells it.

@@ -101,9 +101,11 @@ class Trials:
         self.build, self.scratch, self.quick, self.lock = build, scratch, quick, threading.Lock()
 
     def folder(self, worker):
-        """Where a worker compiles and links: in the build, where its programs find the files of the tree."""
+        """Where a worker compiles and links, empty: in the build, where its programs find the files of the tree. Engines that
+        an earlier call left there would be taken for those of this build."""
         folder = pathlib.Path(self.build.folder) / 'mutants' / f'worker{worker}'
-        folder.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
         return folder
 
     def baseline(self, room):

@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "duet/controllers/import/draft.h"
-#include "duet/controllers/metadata.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/robots/yaml_section.h"
@@ -15,7 +14,7 @@
 namespace duet {
 namespace {
 
-constexpr int kMostJoints = 200, kMostFrames = 1000;  // of a robot; of a history
+constexpr int kMostJoints = 200;  // of a robot
 
 class DeploymentReader {
  public:
@@ -51,19 +50,14 @@ class DeploymentReader {
       refuse(fmt::format("finite numbers in '{}'", key), "others");
     return values;
   }
-  // A whole number, which a file may write as 2.0.
-  [[nodiscard]] int whole(double value, int least, int most, const char* key) const {
-    if (!(value >= least && value <= most && value == std::floor(value)))
-      refuse(fmt::format("a whole number from {} to {} in '{}'", least, most, key), fmt::format("{:g}", value));
-    return static_cast<int>(value);
-  }
   // Which motor each of the network's joints is.
   [[nodiscard]] std::vector<int> motors_of(const YAML::Node& in, const char* key) const {
     const std::vector<double> map = numbers(in, key, 0);
     if (map.empty()) refuse(fmt::format("numbers in '{}'", key), "none");
     std::vector<int> motors;
     motors.reserve(map.size());
-    for (const double motor : map) motors.push_back(whole(motor, 0, static_cast<int>(map.size()) - 1, key));
+    for (const double motor : map)
+      motors.push_back(whole_number(motor, 0, static_cast<int>(map.size()) - 1, key, file_));
     return motors;
   }
   [[nodiscard]] double number_or(const YAML::Node& in, const char* key, double other) const {
@@ -85,6 +79,22 @@ class DeploymentReader {
       joint.action = 1.0;
       draft.joints.push_back(joint);
     }
+  }
+  static void set_gains(Draft& draft, const std::vector<double>& kp, const std::vector<double>& kd,
+                        const std::vector<double>& pose, const std::vector<double>& scale) {
+    for (std::size_t i = 0; i < draft.joints.size(); ++i) {
+      draft.joints[i].kp = kp[i];
+      draft.joints[i].kd = kd[i];
+      draft.joints[i].neutral = pose[i];
+      draft.joints[i].action = scale[i];
+    }
+  }
+  // Numbers that are listed by motor, in the network's order.
+  static std::vector<double> in_order(const std::vector<double>& by_motor, const std::vector<int>& map) {
+    std::vector<double> numbers;
+    numbers.reserve(map.size());
+    for (const int motor : map) numbers.push_back(by_motor[motor]);
+    return numbers;
   }
   [[nodiscard]] std::vector<std::string> metadata_joints() const {
     const auto names = metadata_.find("joint_names");
@@ -119,17 +129,11 @@ class DeploymentReader {
                               pose = numbers(root_, "default_joint_pos", n), scale = numbers(action, "scale", n);
     const std::vector<double> offset =
         action["offset"] && !action["offset"].IsNull() ? numbers(action, "offset", n) : pose;
-    for (std::size_t i = 0; i < n; ++i) {
-      const int motor = map[i];
-      DescriptorJoint& joint = draft.joints[i];
-      joint.kp = kp[motor];
-      joint.kd = kd[motor];
-      joint.neutral = pose[i];
-      joint.action = scale[i];
+    set_gains(draft, in_order(kp, map), in_order(kd, map), pose, scale);
+    for (std::size_t i = 0; i < n; ++i)
       if (std::abs(offset[i] - pose[i]) > 1e-6)
         refuse("an 'offset' of the action that is the default pose",
-               fmt::format("{:g} for '{}', whose default is {:g}", offset[i], joint.name, pose[i]));
-    }
+               fmt::format("{:g} for '{}', whose default is {:g}", offset[i], draft.joints[i].name, pose[i]));
     if (action["clip"] && !action["clip"].IsNull())
       draft.assumed.emplace_back("targets are not clipped: 'clip' of JointPositionAction is left out");
     draft.from["joints"] = fmt::format(
@@ -163,7 +167,8 @@ class DeploymentReader {
         facts.clock = fmt::format("frequency_hz: {:.17g}, standing: zero, after_standing: runs_on",
                                   1.0 / params["period"].as<double>());
       add_term(draft, name, facts);
-      draft.terms.back().frames = whole(number_or(term, "history_length", 1.0), 0, kMostFrames, "history_length");
+      draft.terms.back().frames =
+          whole_number(number_or(term, "history_length", 1.0), 0, kMostFrames, "history_length", file_);
       draft.frames_seen |= draft.terms.back().frames > 1;
       draft.has_clock |= !facts.clock.empty();
     }
@@ -222,14 +227,8 @@ class DeploymentReader {
                               pose = numbers(config, "default_dof_pos", n), scale = numbers(config, "action_scale", n),
                               low = numbers(config, "clip_actions_lower", n),
                               up = numbers(config, "clip_actions_upper", n);
-    for (std::size_t i = 0; i < n; ++i) {
-      DescriptorJoint& joint = draft.joints[i];
-      joint.kp = kp[i];
-      joint.kd = kd[i];
-      joint.neutral = pose[i];
-      joint.action = scale[i];
-      joint.clip = ActionRange{low[i], up[i]};
-    }
+    set_gains(draft, kp, kd, pose, scale);
+    for (std::size_t i = 0; i < n; ++i) draft.joints[i].clip = ActionRange{low[i], up[i]};
     draft.from["joints"] = fmt::format(
         "order: 'joint_mapping'{}; default: 'default_dof_pos'; kp: 'rl_kp'; kd: 'rl_kd'; action: 'action_scale'; clip: "
         "'clip_actions_lower', 'clip_actions_upper'",
@@ -277,18 +276,13 @@ class DeploymentReader {
     Draft draft{.kind = "unitree_rl_gym"};
     if (root_["policy_path"])
       draft.network = std::filesystem::path(root_["policy_path"].as<std::string>()).filename().string();
-    const int n = whole(number_or(root_, "num_actions", 0.0), 1, kMostJoints, "num_actions");
+    const int n = whole_number(number_or(root_, "num_actions", 0.0), 1, kMostJoints, "num_actions", file_);
     std::vector<int> map(n);
     std::iota(map.begin(), map.end(), 0);
     set_joints(draft, map, {});
     const std::vector<double> kp = numbers(root_, "kps", n), kd = numbers(root_, "kds", n),
                               pose = numbers(root_, "default_angles", n), scale = numbers(root_, "action_scale", n);
-    for (int i = 0; i < n; ++i) {
-      draft.joints[i].kp = kp[i];
-      draft.joints[i].kd = kd[i];
-      draft.joints[i].neutral = pose[i];
-      draft.joints[i].action = scale[i];
-    }
+    set_gains(draft, kp, kd, pose, scale);
     draft.from["joints"] = "kp: 'kps'; kd: 'kds'; default: 'default_angles'; action: 'action_scale'";
     draft.rate_hz = 1.0 / (number_or(root_, "simulation_dt", 0.002) * number_or(root_, "control_decimation", 10.0));
     draft.from["rate_hz"] = "1 / ('simulation_dt' 'control_decimation')";

@@ -4,9 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
-#include "duet/controllers/metadata.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/robots/robot_cards.h"
@@ -91,6 +91,13 @@ DraftTerm draft_term(const std::string& name, const TermFacts& facts, const std:
     }
   }
   throw InputError(fmt::format("'{}': {}", file, unknown_name_message("term of an observation", name, known)));
+}
+
+int whole_number(double value, int least, int most, const std::string& key, const std::string& file) {
+  if (!(value >= least && value <= most && value == std::floor(value)))
+    throw InputError(
+        fmt::format("'{}': expected a whole number from {} to {} in '{}', found {:g}", file, least, most, key, value));
+  return static_cast<int>(value);
 }
 
 int joint_of(const RobotModel& robot, const std::string& name) {

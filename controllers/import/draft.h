@@ -12,11 +12,10 @@
 #include <vector>
 
 #include "duet/controllers/descriptor.h"
+#include "duet/controllers/metadata.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {
-
-using Metadata = std::map<std::string, std::string>;  // of an ONNX file, by key
 
 // A term of the makers' observation, as channels of a descriptor: "base_angular_velocity, scale: 0.25".
 struct DraftTerm {
@@ -45,7 +44,7 @@ struct DraftBody {
   std::shared_ptr<const RobotModel> robot;
 };
 
-// What changes a term's channels.
+// The facts of a term that change its channels.
 struct TermFacts {
   std::vector<double> scale = {1.0};
   double clip = std::numeric_limits<double>::infinity();
@@ -64,6 +63,10 @@ DraftBody body_of(const std::vector<std::string>& joints, const std::string& car
 DraftBody body_of(std::size_t joints, const std::string& card, const std::string& file);
 // The robot's joint under a maker's name: without case, "_joint", "-" for "_"; -1: none.
 int joint_of(const RobotModel& robot, const std::string& name);
+
+// A number that a file may write as 2.0. Throws InputError: `key` and file, the bounds, what was found.
+int whole_number(double value, int least, int most, const std::string& key, const std::string& file);
+inline constexpr int kMostFrames = 1000;  // of a history
 
 // The draft of what an ONNX file says of itself. Throws InputError where it says too little, and of what.
 Draft draft_of_metadata(const Metadata& metadata, const std::string& file, const std::string& card);

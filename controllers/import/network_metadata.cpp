@@ -1,4 +1,4 @@
-// What ONNX files say of themselves: the keys of holosoma and those of BeyondMimic, mjlab and their forks.
+// The metadata of ONNX files: the keys of holosoma and those of BeyondMimic, mjlab and their forks.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,7 +7,6 @@
 
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/import/draft.h"
-#include "duet/controllers/metadata.h"
 #include "duet/core/require.h"
 #include "duet/robots/yaml_section.h"
 
@@ -110,7 +109,7 @@ class MetadataReader {
       const char* command = tracks ? "motion_command" : "velocity_commands";
       draft.terms.push_back(draft_term(names[i] == "command" ? command : names[i], facts, file_));
       draft.terms.back().name = names[i];
-      draft.terms.back().frames = static_cast<int>(frames[i]);
+      draft.terms.back().frames = whole_number(frames[i], 0, kMostFrames, "observation_history_lengths", file_);
     }
     if (tracks) return;
     draft.command = VelocityInterface{.forward = {-1, 1}, .lateral = {-1, 1}, .yaw = {-1, 1}};
@@ -235,7 +234,7 @@ class MetadataReader {
   // Terms stand in the input in the order of their names.
   void read_groups(Draft& draft, const YAML::Node& config) {
     const YAML::Node group = part(config, {"observation", "groups", "actor_obs"});
-    const int frames = static_cast<int>(number_or(group, {"history_length"}, 1.0));
+    const int frames = whole_number(number_or(group, {"history_length"}, 1.0), 0, kMostFrames, "history_length", file_);
     std::map<std::string, YAML::Node> terms;
     for (const auto& entry : part(group, {"terms"})) terms[entry.first.Scalar()] = entry.second;
     for (const auto& [name, term] : terms) {

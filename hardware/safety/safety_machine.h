@@ -179,7 +179,7 @@ SafetyMemory next_safety(const SafetyRules& rules, const SafetyMemory& before, c
 
 SafetyOrder safety_order(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input);
 
-// What keeps a robot that is in kStand from moving on to its stance; kNone where nothing does.
+// The cause that keeps a robot in kStand from moving on to its stance; kNone: none does.
 StopCause stand_waits_for(const SafetyRules& rules, const SafetyInput& input);
 
 // The condition that is missing for arming; empty where none is.

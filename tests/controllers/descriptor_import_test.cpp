@@ -103,6 +103,15 @@ TEST_F(ImportTest, OfATrackerFeedsItsTimeStepAndItsAnchor) {
   EXPECT_THAT(made.text, HasSubstr("anchor_orientation_error, frame: pelvis"));
 }
 
+TEST_F(ImportTest, AHistoryThatIsNoWholeNumberOrATrackersTermWithoutItsBodyIsRefused) {
+  auto wild = mimic;
+  wild["observation_history_lengths"] = "1e300,1,1,1,1,1";
+  EXPECT_SENTENCE(refusal({.file = write("wild.onnx", network(96, 29, wild))}));
+  mimic["command_names"] = "motion";
+  mimic["observation_names"] = "command,motion_anchor_ori_b,base_ang_vel,joint_pos,joint_vel,actions";
+  EXPECT_SENTENCE(refusal({.file = write("kick.onnx", network(154, 29, mimic, true))}));
+}
+
 TEST_F(ImportTest, AHistoryThatTheFileDoesNotOrderIsAskedFor) {
   const std::string file = write("long.onnx", network(5 * 96, 29, mimic));
   EXPECT_SENTENCE(refusal({.file = file}));

@@ -68,20 +68,18 @@ class World final : public btMultiBodyDynamicsWorld {
 class LawMotor final : public btMultiBodyJointMotor {
  public:
   LawMotor(btMultiBody* body, int link) : btMultiBodyJointMotor(body, link, 0.0, SIMD_INFINITY) {}
-  double target = 0.0, inertia = 0.0;  // [rad/s, kg m^2]
+  own::LawRow law = {};
 
   void createConstraintRows(btMultiBodyConstraintArray& rows, btMultiBodyJacobianData& data,
                             const btContactSolverInfo& info) override {
     const int before = rows.size();
-    if (inertia > 0.0) btMultiBodyJointMotor::createConstraintRows(rows, data, info);
+    if (law.inertia > 0.0) btMultiBodyJointMotor::createConstraintRows(rows, data, info);
     if (rows.size() == before) return;
     btMultiBodySolverConstraint& row = rows[before];
-    const double softness = 1.0 / inertia;
+    const double softness = 1.0 / law.inertia;
     row.m_jacDiagABInv = 1.0 / (1.0 / row.m_jacDiagABInv + softness);
     row.m_cfm = softness * row.m_jacDiagABInv;
-    row.m_rhs = (target - m_bodyA->getJointVel(m_linkA)) * row.m_jacDiagABInv;
-    row.m_lowerLimit = -SIMD_INFINITY;
-    row.m_upperLimit = SIMD_INFINITY;
+    row.m_rhs = (law.target - m_bodyA->getJointVel(m_linkA)) * row.m_jacDiagABInv;
   }
 };
 
@@ -289,8 +287,7 @@ class BulletOwn final : public own::OwnWorld, btOverlapFilterCallback {
     if (!find_torques(command)) return duet::Outcome::kDiverged;
     for (int i = 0; i < n_; ++i) {
       body_->addJointTorque(i, applied()[i]);
-      motors_[i]->target = law_row(i).target;
-      motors_[i]->inertia = law_row(i).inertia;
+      motors_[i]->law = law_row(i);
     }
     for (int link = 0; link <= n_ && pushes_.any(); ++link) push(link);
     place_partner();

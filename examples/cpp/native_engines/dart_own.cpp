@@ -112,11 +112,15 @@ class LawRows final : public dart::constraint::ConstraintBase {
  public:
   struct Row {
     dd::RevoluteJoint* joint;
-    double target, inertia;  // [rad/s, kg m^2]
+    own::LawRow law;
   };
   explicit LawRows(dd::SkeletonPtr skeleton) : skeleton_(std::move(skeleton)) {}
-  void set(std::vector<Row> rows) {
-    rows_ = std::move(rows);
+  void clear() {
+    rows_.clear();
+    mDim = 0;
+  }
+  void add(const Row& row) {
+    rows_.push_back(row);
     mDim = rows_.size();
   }
 
@@ -130,7 +134,7 @@ class LawRows final : public dart::constraint::ConstraintBase {
       info->findex[i] = -1;
       info->lo[i] = -std::numeric_limits<double>::infinity();
       info->hi[i] = std::numeric_limits<double>::infinity();
-      info->b[i] = rows_[i].target - rows_[i].joint->getVelocity(0);
+      info->b[i] = rows_[i].law.target - rows_[i].joint->getVelocity(0);
     }
   }
   void applyUnitImpulse(std::size_t index) override {
@@ -144,7 +148,7 @@ class LawRows final : public dart::constraint::ConstraintBase {
   }
   void getVelocityChange(double* change, bool with_cfm) override {
     for (std::size_t i = 0; i < mDim; ++i) change[i] = rows_[i].joint->getVelocityChange(0);
-    if (with_cfm) change[unit_] += 1.0 / rows_[unit_].inertia;
+    if (with_cfm) change[unit_] += 1.0 / rows_[unit_].law.inertia;
   }
   void excite() override { skeleton_->setImpulseApplied(true); }
   void unexcite() override { skeleton_->setImpulseApplied(false); }
@@ -381,10 +385,9 @@ class DartOwn final : public own::OwnWorld {
   }
 
   void add_law_rows() {
-    std::vector<LawRows::Row> rows;
+    law_rows_->clear();
     for (int i = 0; i < n_; ++i)
-      if (const auto [target, inertia] = law_row(i); inertia > 0.0) rows.push_back({hinges_[i], target, inertia});
-    law_rows_->set(std::move(rows));
+      if (const own::LawRow law = law_row(i); law.inertia > 0.0) law_rows_->add({hinges_[i], law});
     world_->getConstraintSolver()->addConstraint(law_rows_);
   }
 

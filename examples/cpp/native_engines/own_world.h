@@ -16,6 +16,11 @@
 
 namespace own {
 
+// The row of a joint's law in an engine's solver (OwnWorld::law_row).
+struct LawRow {
+  double target = 0.0, inertia = 0.0;  // [rad/s], [kg m^2]
+};
+
 class OwnWorld : public duet::PhysicsBackend {
  protected:
   // `law_step`: at which the law is asked, where that is not once a step [s].
@@ -49,12 +54,9 @@ class OwnWorld : public duet::PhysicsBackend {
     if (!law_.begin(state_, command)) return false;
     return solve_law();
   }
-  // What the contacts of this step change of that is a row of the engine's solver for each joint: at the end of the
-  // step v + impulse / inertia = target, with the impulse [N m s] on the joint. The motor's limit holds in applied_, so
+  // The contacts of this step change that by a row of the engine's solver for each joint: at the end of the step
+  // v + impulse / inertia = target, with the impulse [N m s] on the joint. The motor's limit holds in applied_, so
   // that a blow can pass it for one step. `inertia` is 0 [kg m^2] where law and robot have none: no row.
-  struct LawRow {
-    double target, inertia;
-  };
   [[nodiscard]] LawRow law_row(int i) const {
     return {v_before_[i] + scene().dt * law_.acceleration()[6 + i], law_.inertia()[i]};
   }
@@ -73,7 +75,7 @@ class OwnWorld : public duet::PhysicsBackend {
   [[nodiscard]] const Eigen::VectorXd& applied() const { return applied_; }
 
   // `f_W` acts on link i; j is another link, or -1 for the ground or the capsule `capsule` of the partner (-1: none).
-  // two links the one that the declared pair names first is reported as touched.
+  // Where both are links, the one that the declared pair names first is reported as touched.
   void report(int i, int j, int capsule, const Eigen::Vector3d& p_W, const Eigen::Vector3d& f_W, double depth) {
     if (contacts_.size() == narrow_phase_.capacity())
       throw std::runtime_error(std::string(name()) + ": more than " + std::to_string(contacts_.size()) +
