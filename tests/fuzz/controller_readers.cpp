@@ -1,5 +1,6 @@
 // Files that controllers are made from: descriptors of networks' inputs and outputs, and the networks of WBC-Sim.
 #include "duet/controllers/descriptor.h"
+#include "duet/controllers/import/descriptor_import.h"
 #include "duet/controllers/wbc_sim/observation.h"
 #include "duet/controllers/wbc_sim/wbc_sim.h"
 #include "duet/core/file.h"
@@ -23,6 +24,33 @@ std::string descriptor_sample(unsigned seed) {
 }
 
 void read_descriptor(std::string_view bytes) { (void)parse_descriptor(std::string(bytes), "fuzz.yaml"); }
+
+// Deployments of the T1 with legs alone.
+std::string deployment_sample(unsigned seed) {
+  const std::string twelve = "[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]";
+  if (seed / 64 % 3 == 0)
+    return "joint_ids_map: [6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5]\nstep_dt: 0.04\nstiffness: " + twelve +
+           "\ndamping: " + twelve + "\ndefault_joint_pos: " + twelve +
+           "\ncommands: {base_velocity: {ranges: {lin_vel_x: [-1, 1], lin_vel_y: [0, 0], ang_vel_z: [-1, 1]}}}\n"
+           "actions: {JointPositionAction: {clip: null, scale: 0.25, offset: null}}\n"
+           "observations:\n  base_ang_vel: {params: {}, clip: [-3, 3], scale: [0.2, 0.2, 0.2], history_length: 2}\n"
+           "  gait_phase: {params: {period: 0.8}, clip: null, scale: [1, 1], history_length: 2}\n";
+  if (seed / 64 % 3 == 1)
+    return "policy_path: a/policy.pt\nsimulation_dt: 0.002\ncontrol_decimation: 10\nkps: " + twelve +
+           "\nkds: " + twelve + "\ndefault_angles: " + twelve +
+           "\nang_vel_scale: 0.25\ndof_pos_scale: 1.0\ndof_vel_scale: 0.05\naction_scale: 0.25\n"
+           "cmd_scale: [2.0, 2.0, 0.25]\nnum_actions: 12\nnum_obs: 47\n";
+  return "t1:\n  model_name: policy.pt\n  joint_mapping: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]\n  rl_kp: " + twelve +
+         "\n  rl_kd: " + twelve + "\n  default_dof_pos: " + twelve + "\n  action_scale: " + twelve +
+         "\n  clip_actions_lower: -100" + "\n  clip_actions_upper: 100" +
+         "\n  observations: [ang_vel, gravity_vec, commands, dof_pos, dof_vel, actions]\n  clip_obs: 100.0\n"
+         "  ang_vel_scale: 0.25\n  dof_pos_scale: 1.0\n  dof_vel_scale: 0.05\n  commands_scale: [2, 2, 0.25]\n"
+         "  observations_history: [1, 0]\n";
+}
+
+void read_deployment(std::string_view bytes) {
+  (void)import_descriptor({.file = scratch_file("deploy.yaml", bytes), .robot = "t1_12dof"});
+}
 
 SafeTensors small_network() {
   const int joints = robot().dof(), inputs = WbcLayout(joints).oracle();
@@ -59,7 +87,9 @@ void read_wbc_network(std::string_view bytes) {
 }  // namespace
 
 std::vector<Reader> controller_readers() {
-  return {{"controller_descriptor", descriptor_sample, read_descriptor}, {"wbc_network", wbc_sample, read_wbc_network}};
+  return {{"controller_descriptor", descriptor_sample, read_descriptor},
+          {"deployment", deployment_sample, read_deployment},
+          {"wbc_network", wbc_sample, read_wbc_network}};
 }
 
 }  // namespace duet::fuzz
