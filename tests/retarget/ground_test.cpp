@@ -36,8 +36,9 @@ PairVariables random_above_legs(const PairProblem& problem, unsigned seed) {
 
 TEST(PairOnGround, GradientIsTheSlopeOfEachTerm) {
   const InteractionClip clip = test::random_clip(6, 1);
-  for (const auto& [name, adapt] :
+  for (const auto& [name, adapted] :
        {std::pair{PairMode::kGrounded, true}, {PairMode::kGrounded, false}, {PairMode::kBest, true}}) {
+    const bool adapt = adapted;  // Clang 14 captures no binding
     PairOptions options = mode(name);
     options.adapt_human = adapt;
     PairProblem problem = make_pair_problem(clip, test::g1(), options);
