@@ -98,6 +98,7 @@ class Measured final : public Backend {
     engine_->reset(state_);
     comparison_.emplace(state_);
     odometry_.update(measured(state_, trial_, random_), {0.0, 0.0, kGravity});
+    periods_ = 0;
   }
   Outcome do_step(const JointCommand& command) override {
     const Eigen::Vector3d v_before = state_.v_WB;
@@ -106,8 +107,13 @@ class Measured final : public Backend {
     contacts_.assign(engine_->contacts().begin(), engine_->contacts().end());
     torques_ = engine_->torques();
     const Eigen::Vector3d a_W = (state_.v_WB - v_before) / scene().dt + kGravity * Eigen::Vector3d::UnitZ();
-    odometry_.update(measured(state_, trial_, random_),
-                     measured_force(state_.X_WB.R.conjugate() * a_W, trial_, random_));
+    const Eigen::Vector3d force = measured_force(state_.X_WB.R.conjugate() * a_W, trial_, random_);
+    const RobotState seen = measured(state_, trial_, random_);
+    ++periods_;
+    if (trial_.lost <= 0.0 || random_.uniform() >= trial_.lost) {
+      odometry_.update(seen, force, static_cast<double>(periods_));
+      periods_ = 0;
+    }
     comparison_->add(state_, odometry_.sample());
     return outcome;
   }
@@ -131,6 +137,7 @@ class Measured final : public Backend {
   const OdometryTrial& trial_;
   Random random_;
   LegOdometry odometry_;
+  int periods_ = 0;  // since a state was read
   std::optional<OdometryComparison> comparison_;
 };
 

@@ -17,6 +17,7 @@ struct OdometryTrial {
   double joint_noise = 0.0, joint_speed_noise = 0.0;  // [rad], [rad/s]
   double gyro_noise = 0.0, tilt_noise = 0.0;          // [rad/s], [rad]
   double force_noise = 0.0, force_bias = 0.0;         // of the accelerometer; the bias is the same on all axes [m/s^2]
+  double lost = 0.0;                                  // share of states that are not read
   std::uint64_t seed = 1;
 };
 

@@ -3,7 +3,9 @@
 // thread.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -72,13 +74,14 @@ class LegOdometry final : public OdometryReader {
   // above 0.
   explicit LegOdometry(std::shared_ptr<const RobotModel> robot, double period = 0.002);
 
-  // A whole and newer state moves it on by one period; any other is left out.
+  // A whole and newer state moves it on by as many periods as the robot's own count says: states that were not read
+  // count, too, and a count rises from one to the next by the least that it ever rose. Any other state is left out.
   void see(const LowStateFrame& frame) override;
   bool take(OdometrySample& sample) override;
 
   // From joints and IMU: X_WB.R, w_WB_B, q and v of the state, and what the accelerometer reads, as if it sat at the
-  // base's origin [m/s^2]. The first one begins at the origin, with the heading of the IMU.
-  void update(const RobotState& state, const Eigen::Vector3d& specific_force_B);
+  // base's origin [m/s^2]. The first one begins at the origin, with the heading of the IMU. `periods`: since the last.
+  void update(const RobotState& state, const Eigen::Vector3d& specific_force_B, double periods = 1.0);
   [[nodiscard]] const OdometrySample& sample() const { return sample_; }
 
  private:
@@ -89,11 +92,13 @@ class LegOdometry final : public OdometryReader {
 
   void place_soles(const RobotState& state);
   void pull(double gain, bool robust);
+  double periods_since(std::uint32_t tick);
 
   std::shared_ptr<const RobotModel> robot_;
   double period_;
   Kinematics kinematics_;
   RobotReading reading_;
+  std::uint32_t least_rise_ = std::numeric_limits<std::uint32_t>::max();  // of the robot's count between two states
   std::vector<Sole> soles_;
   double lowest_ = 0.0;  // of the soles [m]
   Eigen::MatrixXd jacobian_;

@@ -126,6 +126,37 @@ TEST(LegOdometry, TakesWholeNewStatesAlone) {
   EXPECT_FALSE(odometry.take(sample));
 }
 
+LowStateFrame frame_of(const RobotState& state, const Eigen::Vector3d& force, std::uint32_t tick) {
+  LowStateFrame frame{};
+  frame.tick = tick;
+  const Eigen::Quaterniond& R = state.X_WB.R;
+  const double quat_wxyz[4] = {R.w(), R.x(), R.y(), R.z()};
+  for (int k = 0; k < 4; ++k) frame.imu.quaternion[k] = static_cast<float>(quat_wxyz[k]);
+  for (int k = 0; k < 3; ++k) {
+    frame.imu.gyroscope[k] = static_cast<float>(state.w_WB_B[k]);
+    frame.imu.accelerometer[k] = static_cast<float>(force[k]);
+  }
+  for (int j = 0; j < kG1Motors; ++j) {
+    frame.motor[j].q = static_cast<float>(state.q[j]);
+    frame.motor[j].dq = static_cast<float>(state.v[j]);
+  }
+  seal(frame);
+  return frame;
+}
+
+// A robot that counts in milliseconds, every fifth of whose states is lost: the way is as long as without.
+TEST(LegOdometry, StatesThatWereNotReadCount) {
+  LegOdometry all(test::g1()), some(test::g1());
+  constexpr std::uint32_t kBegin = 0xFFFFFF00;  // counts on past 2^32
+  for (int k = 0; k <= 1500; ++k) {
+    const LowStateFrame frame = frame_of(moving_on_the_left(kStep * k), force_at(kStep * k), kBegin + 2U * k);
+    all.see(frame);
+    if (k % 5 != 4) some.see(frame);
+    constexpr double kLonger = 2e-3;  // what the speed changes by over two periods instead of one, added up [m]
+    ASSERT_LE((some.sample().X_WB.p - all.sample().X_WB.p).head<2>().norm(), kLonger) << k;
+  }
+}
+
 TEST(LegOdometry, NeedsSoles) {
   EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { LegOdometry odometry(nullptr); }));
   EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([] { LegOdometry odometry(test::g1(), 0.0); }));
