@@ -151,6 +151,8 @@ void RobotGuard::read_states(double now) {
         ++status_.states;
         next_.state_at = now;
         continue;
+      case FrameFault::kRepeated:
+        continue;
       case FrameFault::kChecksum:
         ++status_.checksum_faults;
         break;

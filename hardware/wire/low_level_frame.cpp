@@ -77,6 +77,7 @@ RobotReading::RobotReading() {
 
 FrameFault read_state(const LowStateFrame& frame, RobotReading& reading) {
   if (frame.crc != checksum_of(frame)) return FrameFault::kChecksum;
+  if (reading.any && frame.tick == reading.tick && frame.crc == reading.checksum) return FrameFault::kRepeated;
   // The robot counts on past 2^32.
   if (reading.any && static_cast<std::int32_t>(frame.tick - reading.tick) <= 0) return FrameFault::kTick;
   if (!is_finite(frame)) return FrameFault::kNotFinite;
@@ -91,6 +92,7 @@ FrameFault read_state(const LowStateFrame& frame, RobotReading& reading) {
   read_health(frame, state, reading.health);
   reading.remote = read_remote(frame.wireless_remote);
   reading.tick = frame.tick;
+  reading.checksum = frame.crc;
   reading.mode_pr = frame.mode_pr;
   reading.mode_machine = frame.mode_machine;
   reading.any = true;

@@ -1,6 +1,6 @@
-// The G1's low-level messages as they lie in memory and on the wire (little-endian; the layout of a C struct is that of
-// the CDR body), and how one is built: from zeros, because padding is inside the checksum. Facts: docs/hardware.md,
-// "Wire". No allocation.
+// The G1's low-level messages as they lie in memory (little-endian, with the layout of a C struct; CDR's differs:
+// hardware/log/frame_cdr.h), and how one is built: from zeros, because padding is inside the checksum. Facts:
+// docs/hardware.md, "Wire". No allocation.
 #pragma once
 
 #include <array>
@@ -96,15 +96,16 @@ void build_damping(double kd, std::uint8_t mode_machine, LowCommandFrame& frame)
 
 void seal(LowStateFrame& frame);  // sets the checksum
 
-// Why a state is not used.
-enum class FrameFault { kNone, kChecksum, kTick, kNotFinite };
+// Why a state is not used. The same one again is no fault: a sender that publishes more often than its robot counts
+// (unitree_mujoco) repeats each. Nor is it news: a robot that only repeats grows old.
+enum class FrameFault { kNone, kChecksum, kTick, kNotFinite, kRepeated };
 
 struct RobotReading {
   RobotState state;     // X_WB.R and w_WB_B of the IMU, q, v; place and velocity of the base are odometry's
   Eigen::VectorXd tau;  // estimated by the motors [N m]
   RobotHealth health;
   RemoteControl remote;
-  std::uint32_t tick = 0;
+  std::uint32_t tick = 0, checksum = 0;
   std::uint8_t mode_pr = 0, mode_machine = 0;
   bool any = false;  // a state has been read
 

@@ -174,6 +174,13 @@ TEST(LowStateFrame, ATickThatDoesNotRiseIsNoticed) {
   EXPECT_EQ(fault_of([](LowStateFrame&) {}, reading), FrameFault::kNone);
 }
 
+TEST(LowStateFrame, TheSameAgainIsRepeatedAndAnotherOfThatTickIsAFault) {
+  RobotReading reading;
+  ASSERT_EQ(read_state(golden_state(), reading), FrameFault::kNone);
+  EXPECT_EQ(fault_of([](LowStateFrame&) {}, reading), FrameFault::kRepeated);
+  EXPECT_EQ(fault_of([](LowStateFrame& f) { f.motor[0].q += 0.1f; }, reading), FrameFault::kTick);
+}
+
 TEST(LowStateFrame, NumbersThatAreNotFiniteAreNoticed) {
   for (const float bad : {kNan, std::numeric_limits<float>::infinity()}) {
     EXPECT_EQ(fault_of([=](LowStateFrame& f) { f.motor[28].q = bad; }), FrameFault::kNotFinite);
