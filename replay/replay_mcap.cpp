@@ -94,7 +94,7 @@ nlohmann::json transform_json(const std::string& frame, const Eigen::Vector3d& p
 class ReplayTopics {
  public:
   // Writes `part`; messages name `path`, the file that it becomes.
-  ReplayTopics(std::string path, const std::string& part) : path_(std::move(path)), file_(part, McapChunks::kZstd) {}
+  ReplayTopics(std::string path, const std::string& part) : path_(std::move(path)), file_(part, McapChunks::kSmall) {}
 
   std::uint16_t add(const std::string& topic, const char* schema_name, const char* schema) {
     require(topics_ < std::numeric_limits<std::uint16_t>::max(), "an MCAP file has at most 65535 topics");

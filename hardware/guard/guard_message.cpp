@@ -235,4 +235,6 @@ bool decode(std::span<const std::byte> datagram, GuardReport& report) {
 
 std::string report_path(const std::string& socket) { return socket + ".report"; }
 
+std::string status_path(const std::string& socket) { return socket + ".status"; }
+
 }  // namespace duet

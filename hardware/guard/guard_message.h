@@ -66,5 +66,7 @@ bool decode(std::span<const std::byte> datagram, GuardReport& report);
 
 // The path that the reports of the guard at `socket` go to.
 std::string report_path(const std::string& socket);
+// The path where `duet hw status` waits for the health of that guard (hardware/log/guard_health.h).
+std::string status_path(const std::string& socket);
 
 }  // namespace duet

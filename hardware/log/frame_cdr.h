@@ -44,11 +44,17 @@ FrameCdr<Frame> cdr_of(const Frame& frame) {
   return cdr;
 }
 
-// False where `data` is no such message; its padding is 0 again.
+// False where `data` is no such message; its padding is 0 again. A struct behind the head, as logs once had it, is
+// taken as it lies.
 template <typename Frame>
 bool read_cdr(std::span<const std::byte> data, Frame& frame) {
   constexpr std::byte kLittleEndian[2] = {std::byte{0}, std::byte{1}};
-  if (data.size() != kCdrBytes<Frame> || !std::equal(kLittleEndian, kLittleEndian + 2, data.begin())) return false;
+  if (data.size() < kCdrHeadBytes || !std::equal(kLittleEndian, kLittleEndian + 2, data.begin())) return false;
+  if (data.size() == kCdrHeadBytes + sizeof(Frame)) {
+    std::memcpy(&frame, data.data() + kCdrHeadBytes, sizeof(Frame));
+    return true;
+  }
+  if (data.size() != kCdrBytes<Frame>) return false;
   const std::size_t motors = motors_at(frame);
   std::memset(&frame, 0, sizeof(frame));
   const auto to = std::as_writable_bytes(std::span(&frame, 1));

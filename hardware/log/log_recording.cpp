@@ -1,16 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
-#include <nlohmann/json.hpp>
+#include <optional>
 
 #include "duet/archives/recording_file.h"
-#include "duet/core/file.h"
 #include "duet/core/recording.h"
 #include "duet/core/require.h"
-#include "duet/hardware/log/frame_cdr.h"
+#include "duet/hardware/log/log_reader.h"
 #include "duet/hardware/log/run_log.h"
-#include "duet/hardware/safety/limiter_setup_json.h"
 
 namespace duet {
 namespace {
@@ -23,43 +20,34 @@ struct LoggedTick {
   std::optional<LowCommandFrame> sent;
 };
 
-// Reads a log message by message and keeps every tenth tick of the episode in it.
-class LogReader {
+// Keeps every tenth tick of the episode in a log.
+class EpisodeTicks {
  public:
-  explicit LogReader(std::string path) : path_(std::move(path)) {}
-
-  void take(const McapChannel& channel, const McapMessage& message) {
-    if (channel.topic == "guard/setup") return take_setup(message.data);
-    if (channel.message_encoding == kTickEncoding) return take_tick(message.data);
-    if (channel.topic == "rt/lowcmd") return take_frame(message.data);
-    if (channel.topic == "guard/events") take_event(message.data);
+  LogParts parts() {
+    LogParts parts;
+    parts.setup = [this](const LimiterSetup& of, const nlohmann::json&) { setup = of; };
+    parts.tick = [this](const TickRecord& record) { take(record); };
+    parts.command = [this](const LowCommandFrame& frame) {  // of the tick before it in the file
+      for (std::vector<LoggedTick>* ticks : latest_) ticks->back().sent = frame;
+    };
+    parts.event = [this](const LogEvent& event) { take(event); };
+    return parts;
   }
 
   std::optional<LimiterSetup> setup;
   std::vector<LoggedTick> with_goal, any;
   std::vector<std::string> events;
-  std::string state = "offline", cause = "none", end_cause;
+  std::string end_cause;
 
  private:
-  [[nodiscard]] bool runs() const { return state == "run" || state == "hold"; }
+  [[nodiscard]] bool runs() const { return state_ == "run" || state_ == "hold"; }
 
-  void take_setup(std::span<const std::byte> data) {
-    const nlohmann::json json = nlohmann::json::parse(text_of(data), nullptr, false);
-    if (!json.is_object() || !json.contains("limiter"))
-      throw InputError(fmt::format("{}: expected the setup of a limiter, found none", path_));
-    setup = parse_limiter_setup(json["limiter"], path_);
-  }
-
-  void take_tick(std::span<const std::byte> data) {
-    if (data.size() != sizeof(TickRecord))
-      throw InputError(fmt::format("{}: expected ticks of {} bytes, found {}", path_, sizeof(TickRecord), data.size()));
+  void take(const TickRecord& record) {
     latest_ = {};
     if (!runs()) return;
-    LoggedTick tick{};
-    std::memcpy(&tick.record, data.data(), sizeof(TickRecord));
-    const bool goal = (tick.record.flags & kTickGoal) != 0;
+    const LoggedTick tick{record, {}};
     keep(tick, runs_++, any);
-    if (goal) keep(tick, goals_++, with_goal);
+    if ((record.flags & kTickGoal) != 0) keep(tick, goals_++, with_goal);
   }
 
   void keep(const LoggedTick& tick, long count, std::vector<LoggedTick>& ticks) {
@@ -68,32 +56,14 @@ class LogReader {
     latest_.push_back(&ticks);
   }
 
-  // Takes the command frame of the tick before it in the file.
-  void take_frame(std::span<const std::byte> data) {
-    LowCommandFrame frame;
-    if (!read_cdr(data, frame))
-      throw InputError(fmt::format("{}: expected commands of {} bytes of CDR, found {}", path_,
-                                   kCdrBytes<LowCommandFrame>, data.size()));
-    for (std::vector<LoggedTick>* ticks : latest_) ticks->back().sent = frame;
-  }
-
-  void take_event(std::span<const std::byte> data) {
-    events.emplace_back(text_of(data));
-    const nlohmann::json json = nlohmann::json::parse(text_of(data), nullptr, false);
-    if (!json.is_object() || !json.value("state", nlohmann::json()).is_string() ||
-        !json.value("cause", nlohmann::json()).is_string())
-      throw InputError(fmt::format("{}: expected events with a state and a cause, found others", path_));
+  void take(const LogEvent& event) {
+    events.push_back(event.text);
     const bool ran = runs();
-    state = json["state"].get<std::string>();
-    cause = json["cause"].get<std::string>();
-    if (ran && !runs()) end_cause = cause;
+    state_ = event.state;
+    if (ran && !runs()) end_cause = event.cause;
   }
 
-  static std::string_view text_of(std::span<const std::byte> data) {
-    return {reinterpret_cast<const char*>(data.data()), data.size()};
-  }
-
-  std::string path_;
+  std::string state_ = "offline";
   std::vector<std::vector<LoggedTick>*> latest_;
   long runs_ = 0, goals_ = 0;
 };
@@ -153,7 +123,7 @@ PointTracks people_of(const std::vector<LoggedTick>& ticks, int frames) {
   return seen > 0 ? people : PointTracks();
 }
 
-void set_end(const LogReader& log, Recording& recording) {
+void set_end(const EpisodeTicks& log, Recording& recording) {
   if (recording.outcome != Outcome::kOk || log.end_cause.empty() || log.end_cause == "stop_key") return;
   recording.outcome = Outcome::kError;
   recording.message = fmt::format("the guard ended the run: {}", log.end_cause);
@@ -162,14 +132,9 @@ void set_end(const LogReader& log, Recording& recording) {
 }  // namespace
 
 LoggedRun recording_of_log(const std::string& path, std::optional<Task> task) {
-  const std::string bytes = read_file(path);
-  LogReader log(path);
+  EpisodeTicks log;
   LoggedRun run;
-  run.whole =
-      read_mcap(std::as_bytes(std::span(bytes)), path, [&](const McapChannel& channel, const McapMessage& message) {
-        log.take(channel, message);
-      }).whole;
-  if (!log.setup) throw InputError(fmt::format("{}: expected the log of a run, found an MCAP file without one", path));
+  run.whole = read_run_log(path, log.parts());
   const std::vector<LoggedTick>& ticks = log.with_goal.empty() ? log.any : log.with_goal;
   if (ticks.empty()) throw InputError(fmt::format("{}: expected ticks in which the guard ran, found none", path));
   const RobotModel& robot = *log.setup->robot;

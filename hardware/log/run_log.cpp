@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
-#include <optional>
+#include <utility>
 
 #include "duet/core/file.h"
 #include "duet/core/json.h"
@@ -14,31 +14,32 @@
 #include "duet/core/share.h"
 #include "duet/hardware/log/frame_cdr.h"
 #include "duet/hardware/safety/limiter_setup_json.h"
+#include "duet/rows/json_fields.h"
 
 namespace duet {
 namespace {
 
 constexpr std::size_t kSlots = 4096;  // of the ring: 8 s of ticks
-constexpr std::uint16_t kSetupChannel = 1, kTickChannel = 2, kFrameChannel = 3, kEventChannel = 4, kStateChannel = 5;
+constexpr int kTicksPerHealth = 10;   // 50 Hz
+constexpr std::uint16_t kSetupChannel = 1, kTickChannel = 2, kFrameChannel = 3, kEventChannel = 4, kStateChannel = 5,
+                        kHealthChannel = 6, kLimiterChannel = 7;
 
-const McapChannel kChannels[] = {
-    {kSetupChannel, "guard/setup", "json", "", "", ""},
-    {kTickChannel, "guard/tick", kTickEncoding, "", "", ""},
-    {kFrameChannel, "rt/lowcmd", "cdr", "unitree_hg::msg::dds_::LowCmd_", "omgidl",
-     "module unitree_hg { module msg { module dds_ {\n"
-     "struct MotorCmd_ { octet mode; float q; float dq; float tau; float kp; float kd; unsigned long reserve; };\n"
-     "struct LowCmd_ { octet mode_pr; octet mode_machine; MotorCmd_ motor_cmd[35]; unsigned long reserve[4]; "
-     "unsigned long crc; };\n};};};\n"},
-    {kEventChannel, "guard/events", "json", "", "", ""},
-    {kStateChannel, "rt/lowstate", "cdr", "unitree_hg::msg::dds_::LowState_", "omgidl",
-     "module unitree_hg { module msg { module dds_ {\n"
-     "struct IMUState_ { float quaternion[4]; float gyroscope[3]; float accelerometer[3]; float rpy[3]; short "
-     "temperature; };\n"
-     "struct MotorState_ { octet mode; float q; float dq; float ddq; float tau_est; short temperature[2]; float vol; "
-     "unsigned long sensor[2]; unsigned long motorstate; unsigned long reserve[4]; };\n"
-     "struct LowState_ { unsigned long version[2]; octet mode_pr; octet mode_machine; unsigned long tick; IMUState_ "
-     "imu_state; MotorState_ motor_state[35]; octet wireless_remote[40]; unsigned long reserve[4]; unsigned long crc; "
-     "};\n};};};\n"}};
+// The maker's messages for readers of ROS 2, whose CDR is that of DDS.
+constexpr const char* kCommandSchema =
+    "uint8 mode_pr\nuint8 mode_machine\nunitree_hg/MotorCmd[35] motor_cmd\nuint32[4] reserve\nuint32 crc\n"
+    "================================================================================\n"
+    "MSG: unitree_hg/MotorCmd\n"
+    "uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 tau\nfloat32 kp\nfloat32 kd\nuint32 reserve\n";
+constexpr const char* kStateSchema =
+    "uint32[2] version\nuint8 mode_pr\nuint8 mode_machine\nuint32 tick\nunitree_hg/IMUState imu_state\n"
+    "unitree_hg/MotorState[35] motor_state\nuint8[40] wireless_remote\nuint32[4] reserve\nuint32 crc\n"
+    "================================================================================\n"
+    "MSG: unitree_hg/IMUState\n"
+    "float32[4] quaternion\nfloat32[3] gyroscope\nfloat32[3] accelerometer\nfloat32[3] rpy\nint16 temperature\n"
+    "================================================================================\n"
+    "MSG: unitree_hg/MotorState\n"
+    "uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 ddq\nfloat32 tau_est\nint16[2] temperature\nfloat32 vol\n"
+    "uint32[2] sensor\nuint32 motorstate\nuint32[4] reserve\n";
 
 template <std::size_t N>
 void put(const Eigen::VectorXd& from, double (&to)[N]) {
@@ -66,44 +67,43 @@ std::uint64_t nanoseconds(double seconds) { return static_cast<std::uint64_t>(st
 
 std::span<const std::byte> bytes_of_text(const std::string& text) { return std::as_bytes(std::span(text)); }
 
-bool same_bits(const double* a, const double* b, std::size_t count) {
-  return std::memcmp(a, b, count * sizeof(double)) == 0;
+// Four decimals: a tenth of a millimetre, or of a milliradian.
+nlohmann::json rounded(double value) { return number_or_null(std::round(1e4 * value) / 1e4); }
+
+nlohmann::json root_json(const double (&root)[4]) {
+  return {{"forward", rounded(root[0])},
+          {"lateral", rounded(root[1])},
+          {"yaw_rate", rounded(root[2])},
+          {"height", rounded(root[3])}};
 }
 
-bool same_output(const TickRecord& record, const LimitedCommand& out) {
-  double root[4];
-  put_root(out.root, root);
-  return same_bits(root, record.sent_root, 4) && same_bits(out.q.data(), record.sent_q, kG1Motors) &&
-         same_bits(out.kp.data(), record.sent_kp, kG1Motors) && same_bits(out.kd.data(), record.sent_kd, kG1Motors);
+// A tick of the limiter for others to plot: asked for, sent and measured; and how often a command was changed since the
+// message before, by reason.
+nlohmann::json limiter_json(const TickRecord& tick, const LimiterSetup& setup, double share,
+                            const ClampCounts& clamps) {
+  nlohmann::json joints = nlohmann::json::object(), changed = nlohmann::json::object();
+  for (const int joint : setup.executed.joints)
+    joints[setup.robot->joints[joint].name] = {{"measured", rounded(tick.q[joint])},
+                                               {"asked", rounded(tick.asked_q[joint])},
+                                               {"sent", rounded(tick.sent_q[joint])}};
+  for (std::size_t k = 0; k < kClampReasons; ++k) changed[std::string(kClampNames[k])] = clamps[k];
+  return {{"time", tick.now},
+          {"share", rounded(share)},
+          {"root", {{"asked", root_json(tick.asked_root)}, {"sent", root_json(tick.sent_root)}}},
+          {"joints", std::move(joints)},
+          {"clamps", std::move(changed)}};
 }
 
-// Passes ticks through a limiter of the log's own setup.
-class LimiterReplay {
- public:
-  explicit LimiterReplay(const LimiterSetup& setup)
-      : limiter_(setup), state_(limiter_.start(setup.robot->standing_state())) {
-    input_.state = setup.robot->standing_state();
+// Measures how far the joints that follow a target are from it.
+void measure_tracking(const LowCommandFrame& frame, const TickRecord& tick, const RobotModel& robot,
+                      HealthMessage& message) {
+  for (int j = 0; j < kG1Motors; ++j) {
+    const double apart = std::abs(static_cast<double>(frame.motor[j].q) - tick.q[j]);
+    if (!(frame.motor[j].kp > 0.0F) || apart <= message.health.tracking) continue;
+    message.health.tracking = apart;
+    message.tracking_joint = robot.joints[j].name;
   }
-  bool agrees(const TickRecord& record) {
-    read_record(record, input_, person_, command_);
-    if ((record.flags & kTickRestarted) != 0) {
-      get(record.restart_q, restart_);
-      limiter_.restart(restart_, state_);
-    }
-    limiter_.tick((record.flags & kTickReceived) != 0 ? &command_ : nullptr, input_, state_, out_, counts_);
-    return same_output(record, out_);
-  }
-
- private:
-  Limiter limiter_;
-  LimiterState state_;
-  LimiterInput input_;
-  HumanJoints person_;
-  MotionCommand command_;
-  LimitedCommand out_;
-  ClampCounts counts_{};
-  Eigen::VectorXd restart_;
-};
+}
 
 }  // namespace
 
@@ -156,21 +156,36 @@ void read_record(const TickRecord& r, LimiterInput& input, HumanJoints& person, 
   get(r.asked_q, command.q);
 }
 
-RunLog::RunLog(const std::string& path, const GuardSetup& setup)
-    : writer_(path, McapChunks::kOneMessage), ring_(kSlots) {
-  for (const McapChannel& channel : kChannels) writer_.add(channel);
-  const LimiterSetup& limiter = setup.limiter;
-  const nlohmann::json json = {
-      {"duet", duet_version()},
-      {"limiter", limiter_setup_json(limiter)},
-      {"odometry", kOdometryNames[static_cast<std::size_t>(setup.odometry)]},
-      {"executor",
-       executed_channels_json(executed_channels(setup.executor, *limiter.robot, limiter.executed.joints, setup.walker),
-                              *limiter.robot)}};
-  const std::string text = dumped(json);
-  if (!writer_.write(kSetupChannel, 0, 0, bytes_of_text(text)) || !writer_.flush())
-    throw StorageError(fmt::format("cannot write '{}'", path));
+PersonGap::PersonGap(const LimiterSetup& setup) : distance_(setup.robot, setup.human, {}) {
+  input_.state = setup.robot->standing_state();
+}
+
+double PersonGap::measure(const TickRecord& tick) {
+  read_record(tick, input_, person_, command_);
+  if (input_.person == nullptr || !input_.odometry) return kUnknown;
+  const double gap = distance_.measure(input_.state.X_WB, input_.state.q, input_.person, 0.0, false).person;
+  return gap < BodyGaps::kFar ? gap : kUnknown;
+}
+
+RunLog::RunLog(const std::string& path, const GuardSetup& setup, Watch watch)
+    : setup_(setup), watch_(std::move(watch)), writer_(path, McapChunks::kFast), ring_(kSlots), gap_(setup.limiter) {
+  add_channels();
+  if (!writer_.flush()) throw StorageError(fmt::format("cannot write '{}'", path));
   thread_ = std::thread([this] { write_slots(); });
+}
+
+void RunLog::add_channels() {
+  const auto json_channel = [&](std::uint16_t id, const char* topic, const char* type, const nlohmann::json& sample) {
+    writer_.add({id, topic, "json", type, "jsonschema", dumped(json_schema_of(sample, type))});
+  };
+  writer_.add({kSetupChannel, "guard/setup", "json", "", "", ""});
+  writer_.add({kTickChannel, "guard/tick", kTickEncoding, "", "", ""});
+  writer_.add({kFrameChannel, "rt/lowcmd", "cdr", "unitree_hg/msg/LowCmd", "ros2msg", kCommandSchema});
+  json_channel(kEventChannel, "guard/events", "duet.GuardEvent",
+               {{"state", ""}, {"cause", ""}, {"dropped", 0}, {"restarts", 0}});
+  writer_.add({kStateChannel, "rt/lowstate", "cdr", "unitree_hg/msg/LowState", "ros2msg", kStateSchema});
+  json_channel(kHealthChannel, "guard/health", "duet.GuardHealth", health_json({}));
+  json_channel(kLimiterChannel, "guard/limiter", "duet.LimiterTick", limiter_json({}, setup_.limiter, 0.0, {}));
 }
 
 RunLog::~RunLog() {
@@ -187,6 +202,9 @@ void RunLog::add(const RobotGuard& guard) {
   const GuardStatus& status = guard.status();
   Slot& slot = ring_[added % kSlots];
   slot.tick = record_of(guard);
+  fill_health(guard, slot.health);
+  slot.missing = status.safety.state == SafetyState::kListen ? status.safety.missing : std::string_view();
+  slot.clamps = status.clamps;
   slot.took = status.took_state;
   slot.sent = status.sent;
   if (slot.took) slot.received = status.state_frame;
@@ -215,19 +233,61 @@ void RunLog::write_slots() {
   }
   if (const long rest = dropped_ - told_; rest > 0)
     write_event(nanoseconds(last_.tick.now), last_.state, last_.cause, "dropped", rest);
+  if (!began_) write_setup(0);
   good_ = writer_.finish();
 }
 
 void RunLog::write_slot(const Slot& slot) {
   const std::uint64_t time = nanoseconds(slot.tick.now);
   ++sequence_;
+  if (!began_) write_setup(time);
   if (slot.dropped > 0) write_event(time, last_.state, last_.cause, "dropped", slot.dropped);
+  const double passed = slot.tick.now - last_.tick.now;
+  const bool late = began_ && slot.dropped == 0;
+  GuardHealth health = slot.health;
+  health.late = late ? std::max(passed - setup_.limiter.dt, 0.0) : 0.0;
+  widen(health, window_);
+  began_ = true;
   last_ = slot;
   writer_.write(kTickChannel, sequence_, time, std::as_bytes(std::span(&slot.tick, 1)));
   if (slot.took) write_frame(kStateChannel, time, cdr_of(slot.received));
   if (slot.sent) write_frame(kFrameChannel, time, cdr_of(slot.frame));
   if (slot.changed) write_event(time, slot.state, slot.cause);
   if (slot.restarts > 0) write_event(time, slot.state, slot.cause, "restarts", slot.restarts);
+  if (ticks_to_health_-- <= 0) write_plain(slot, time);
+}
+
+void RunLog::write_setup(std::uint64_t time) {
+  const LimiterSetup& limiter = setup_.limiter;
+  write_json(kSetupChannel, time,
+             {{"duet", duet_version()},
+              {"limiter", limiter_setup_json(limiter)},
+              {"odometry", kOdometryNames[static_cast<std::size_t>(setup_.odometry)]},
+              {"executor", executed_channels_json(executed_channels(setup_.executor, *limiter.robot,
+                                                                    limiter.executed.joints, setup_.walker),
+                                                  *limiter.robot)}});
+}
+
+// The messages that others plot, for the ticks since the last one.
+void RunLog::write_plain(const Slot& slot, std::uint64_t time) {
+  ticks_to_health_ = kTicksPerHealth - 1;
+  HealthMessage message{window_, std::string(slot.missing), "", std::string(next_key(slot.state, slot.health.stands))};
+  message.health.left_out = dropped_;
+  message.health.distance = gap_.measure(slot.tick);
+  if (slot.sent) measure_tracking(slot.frame, slot.tick, *setup_.limiter.robot, message);
+  window_ = {};
+  const std::string text = dumped(health_json(message));
+  writer_.write(kHealthChannel, sequence_, time, bytes_of_text(text));
+  if (watch_) watch_(text);
+  ClampCounts clamps = slot.clamps;
+  for (std::size_t k = 0; k < kClampReasons; ++k) clamps[k] -= told_clamps_[k];
+  told_clamps_ = slot.clamps;
+  write_json(kLimiterChannel, time, limiter_json(slot.tick, setup_.limiter, slot.health.share, clamps));
+}
+
+void RunLog::write_json(std::uint16_t channel, std::uint64_t time, const nlohmann::json& json) {
+  const std::string text = dumped(json);
+  writer_.write(channel, sequence_, time, bytes_of_text(text));
 }
 
 // A change of state, or that `n` ticks are not in the log here ("dropped"), or `n` streams were taken again after a
@@ -235,47 +295,11 @@ void RunLog::write_slot(const Slot& slot) {
 void RunLog::write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted, long n) {
   nlohmann::json event = {{"state", safety_state_name(state)}, {"cause", stop_cause_name(cause)}};
   if (counted != nullptr) event[counted] = n;
-  writer_.write(kEventChannel, sequence_, time, bytes_of_text(dumped(event)));
+  write_json(kEventChannel, time, event);
 }
 
 void RunLog::write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame) {
   writer_.write(channel, sequence_, time, frame);
-}
-
-LogReplay replay_log(const std::string& path) {
-  const std::string bytes = read_file(path);
-  LogReplay replay;
-  std::optional<LimiterReplay> limiter;
-  const auto each = [&](const McapChannel& channel, const McapMessage& message) {
-    const std::string_view text(reinterpret_cast<const char*>(message.data.data()), message.data.size());
-    if (channel.topic == "guard/setup") {
-      const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-      if (!json.is_object() || !json.contains("limiter"))
-        throw InputError(fmt::format("{}: expected the setup of a limiter, found none", path));
-      const LimiterSetup setup = parse_limiter_setup(json["limiter"], path);
-      try {
-        limiter.emplace(setup);
-      } catch (const std::invalid_argument& error) {
-        throw InputError(fmt::format("{}: {}", path, error.what()));
-      }
-    } else if (channel.message_encoding == kTickEncoding) {
-      if (!limiter || message.data.size() != sizeof(TickRecord))
-        throw InputError(
-            fmt::format("{}: expected a setup and ticks of {} bytes, found others", path, sizeof(TickRecord)));
-      TickRecord record;
-      std::memcpy(&record, message.data.data(), sizeof(record));
-      ++replay.ticks;
-      replay.different += limiter->agrees(record) ? 0 : 1;
-    } else if (channel.topic == "guard/events") {
-      replay.events.emplace_back(text);
-      const nlohmann::json event = nlohmann::json::parse(text, nullptr, false);
-      if (event.is_object() && event.contains("dropped") && event["dropped"].is_number_integer())
-        replay.dropped += event["dropped"].get<long>();
-    }
-  };
-  replay.whole = read_mcap(bytes_of_text(bytes), path, each).whole;
-  if (!limiter) throw InputError(fmt::format("{}: expected the log of a run, found an MCAP file without one", path));
-  return replay;
 }
 
 }  // namespace duet

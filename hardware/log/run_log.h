@@ -1,9 +1,10 @@
-// The log of a run: everything that reached the limiter, what it made of it, and the frames, in one append-only MCAP
-// file (docs/hardware.md, "Log"). A thread of its own writes; the guard's tick only copies into a ring, and what finds
-// no room there is counted.
+// The log of a run: everything that reached the limiter, what it made of it, the frames, and 50 times a second how the
+// run is, in one MCAP file (docs/hardware.md, "Log"). A thread of its own writes; the guard's tick only copies into a
+// ring, and what finds no room there is counted.
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,8 @@
 #include "duet/archives/mcap.h"
 #include "duet/core/recording.h"
 #include "duet/hardware/guard/robot_guard.h"
+#include "duet/hardware/log/guard_health.h"
+#include "duet/hardware/safety/contact_watch.h"
 #include "duet/robots/robot_model.h"
 #include "duet/scoring/recording_scores.h"
 
@@ -47,10 +50,27 @@ inline constexpr const char* kTickEncoding = "duet.tick/2";
 TickRecord record_of(const RobotGuard& guard);
 void read_record(const TickRecord& record, LimiterInput& input, HumanJoints& person, MotionCommand& command);
 
+// The person's distance in ticks: of capsules from capsules, where both were measured. One owner.
+class PersonGap {
+ public:
+  explicit PersonGap(const LimiterSetup& setup);
+  // [m], below 0 in contact; NaN where person or odometry is not known.
+  double measure(const TickRecord& tick);
+
+ private:
+  BodyDistance distance_;
+  LimiterInput input_;
+  HumanJoints person_;
+  MotionCommand command_;
+};
+
 class RunLog {
  public:
-  // Makes `path` and writes what the limiter was made of. Throws StorageError.
-  RunLog(const std::string& path, const GuardSetup& setup);
+  // Called by the thread that writes, 50 times a second, with a message of "guard/health".
+  using Watch = std::function<void(const std::string& text)>;
+
+  // Makes `path`; the first tick brings what the limiter was made of. Throws StorageError.
+  RunLog(const std::string& path, const GuardSetup& setup, Watch watch = {});
   ~RunLog();
   RunLog(const RunLog&) = delete;
   RunLog& operator=(const RunLog&) = delete;
@@ -64,6 +84,9 @@ class RunLog {
  private:
   struct Slot {
     TickRecord tick;
+    GuardHealth health;
+    std::string_view missing;
+    ClampCounts clamps;
     LowStateFrame received;
     LowCommandFrame frame;
     bool took = false, sent = false, changed = false;
@@ -74,9 +97,15 @@ class RunLog {
   };
   void write_slots();
   void write_slot(const Slot& slot);
+  void write_setup(std::uint64_t time);
+  void write_plain(const Slot& slot, std::uint64_t time);
+  void write_json(std::uint16_t channel, std::uint64_t time, const nlohmann::json& json);
+  void add_channels();
   void write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted = nullptr, long n = 0);
   void write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame);
 
+  GuardSetup setup_;
+  Watch watch_;
   McapWriter writer_;
   std::vector<Slot> ring_;
   std::atomic<std::uint64_t> added_ = 0, written_ = 0;
@@ -85,20 +114,14 @@ class RunLog {
   std::atomic<long> dropped_ = 0;
   long told_ = 0, told_restarts_ = 0;  // by a slot
   Slot last_ = {};                     // that was written
+  bool began_ = false;                 // a slot was written
+  PersonGap gap_;
+  GuardHealth window_;  // since the last message of health
+  ClampCounts told_clamps_{};
+  long ticks_to_health_ = 0;
   std::uint32_t sequence_ = 0;
   std::thread thread_;
 };
-
-struct LogReplay {
-  long ticks = 0, different = 0;
-  long dropped = 0;                 // ticks that are not in the log: the next one may differ for it
-  bool whole = false;               // the log has its end
-  std::vector<std::string> events;  // states and causes, in order
-};
-
-// Passes a log through a limiter made of what stands in it, and compares each output to the bit. Throws InputError for
-// a file that is no such log, or made for another robot than the one whose card is here.
-LogReplay replay_log(const std::string& path);
 
 // The log of a run as a recording that every metric and detector takes, with the mask of what was executed of the
 // reference: what no executor moved cannot be scored as if it had been.
@@ -113,7 +136,7 @@ struct LoggedRun {
 // The ticks of a log in which the guard ran or held for a planner with a goal; where none had one, all in which it ran
 // or held: the reference's root is then the measured one. The outcome is `fell` where the robot fell (the recording
 // ends there), `error` where the guard ended the run for another reason than its operator, and else `ok`.
-// Throws InputError for a file that is no such log, made for another robot, or without such ticks.
+// Throws as read_run_log() (hardware/log/log_reader.h), and InputError for a log without such ticks.
 LoggedRun recording_of_log(const std::string& path, std::optional<Task> task = {});
 
 // Saves the recording with the mask. Throws InputError where the file cannot be written.

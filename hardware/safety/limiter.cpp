@@ -82,6 +82,7 @@ Limiter::Limiter(const LimiterSetup& setup)
   wanted_.q.setZero(setup_.robot->dof());
   q_rest_.setZero(setup_.robot->dof());
   before_.resize(setup_.robot->joints.size());
+  joint_clamps_.assign(setup_.robot->joints.size(), 0);
 }
 
 LimiterState Limiter::start(const RobotState& measured) const {
@@ -104,6 +105,7 @@ void Limiter::restart(const Eigen::VectorXd& q, LimiterState& state) const {
 
 void Limiter::tick(const MotionCommand* received, const LimiterInput& input, LimiterState& state, LimitedCommand& out,
                    ClampCounts& counts) {
+  std::ranges::fill(joint_clamps_, 0);
   admit(received, state, counts);
   choose(input, state, counts);
   before_ = state.joints;
@@ -116,6 +118,12 @@ void Limiter::tick(const MotionCommand* received, const LimiterInput& input, Lim
   avoid_bodies(input, before_, gaps, state, counts);
   if (setup_.executed.fixed_gains) give_way(input, state, counts);
   write(input, state, out, counts);
+}
+
+void Limiter::count_joint_if(bool clamped, int joint, ClampReason reason, ClampCounts& counts) {
+  if (!clamped) return;
+  count(counts, reason);
+  joint_clamps_[joint] |= std::uint32_t{1} << static_cast<unsigned>(reason);
 }
 
 std::optional<ClampReason> Limiter::refusal(const MotionCommand& command, const LimiterState& state) const {
@@ -234,19 +242,19 @@ double Limiter::within_torque(int joint, const LimiterInput& input, double targe
   return std::clamp(target, q + (damping - most) / kp, q + (damping + most) / kp);
 }
 
-double Limiter::lead_target(int joint, const LimiterInput& input, ClampCounts& counts) const {
+double Limiter::lead_target(int joint, const LimiterInput& input, ClampCounts& counts) {
   const double target = within_torque(joint, input, wanted_.q[joint]);
-  count_if(target != wanted_.q[joint], counts, ClampReason::kJointLead);
+  count_joint_if(target != wanted_.q[joint], joint, ClampReason::kJointLead, counts);
   return target;
 }
 
 // An arm that is pushed away faster than its target may follow is followed all the same where the gains cannot fall.
-void Limiter::give_way(const LimiterInput& input, LimiterState& state, ClampCounts& counts) const {
+void Limiter::give_way(const LimiterInput& input, LimiterState& state, ClampCounts& counts) {
   for (const int joint : setup_.executed.joints) {
     const double given = within_torque(joint, input, state.joints[joint].value);
     if (std::abs(given - state.joints[joint].value) <= kNearer) continue;
     state.joints[joint] = {std::clamp(given, joint_bounds_[joint].lower, joint_bounds_[joint].upper), 0.0};
-    count(counts, ClampReason::kJointTorque);
+    count_joint_if(true, joint, ClampReason::kJointTorque, counts);
   }
 }
 
@@ -261,9 +269,9 @@ void Limiter::move_joints(const LimiterInput& input, LimiterState& state, ClampC
     bounds.stop_rate = bounds.rate;
     AxisClamps clamps;
     state.joints[joint] = follow(lead_target(joint, input, counts), before_[joint], bounds, setup_.dt, clamps);
-    count_if(clamps.value, counts, ClampReason::kJointLimit);
-    count_if(clamps.rate, counts, ClampReason::kJointSpeed);
-    count_if(clamps.rate_change, counts, ClampReason::kJointAcceleration);
+    count_joint_if(clamps.value, joint, ClampReason::kJointLimit, counts);
+    count_joint_if(clamps.rate, joint, ClampReason::kJointSpeed, counts);
+    count_joint_if(clamps.rate_change, joint, ClampReason::kJointAcceleration, counts);
   }
 }
 
@@ -304,8 +312,7 @@ void Limiter::avoid_bodies(const LimiterInput& input, const std::vector<AxisStat
   for (const int joint : setup_.executed.joints) state.joints[joint] = braked[joint];
 }
 
-void Limiter::write(const LimiterInput& input, const LimiterState& state, LimitedCommand& out,
-                    ClampCounts& counts) const {
+void Limiter::write(const LimiterInput& input, const LimiterState& state, LimitedCommand& out, ClampCounts& counts) {
   const int dof = setup_.robot->dof();
   out.root = {state.forward.value, state.lateral.value, state.yaw.value, state.height.value};
   out.q = input.state.q;
@@ -318,7 +325,7 @@ void Limiter::write(const LimiterInput& input, const LimiterState& state, Limite
     const double asked = std::abs(kp * (out.q[joint] - input.state.q[joint]) - kd * input.state.v[joint]);
     const bool lowers = !setup_.executed.fixed_gains && asked > most + kTorqueRounding;
     const double gain = lowers ? most / asked : 1.0;
-    count_if(gain < 1.0, counts, ClampReason::kJointTorque);
+    count_joint_if(gain < 1.0, joint, ClampReason::kJointTorque, counts);
     out.kp[joint] = gain * kp;
     out.kd[joint] = gain * kd;
   }

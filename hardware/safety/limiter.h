@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -143,6 +144,8 @@ class Limiter {
 
   // Distances of the arms at rest after the last tick, in the last tick's pose of the root.
   [[nodiscard]] const BodyGaps& gaps() const { return distance_.gaps(); }
+  // The reasons for which each joint was changed in the last tick: bit k is ClampReason k.
+  [[nodiscard]] const std::vector<std::uint32_t>& joint_clamps() const { return joint_clamps_; }
   // The share of all speeds in the last tick, after the distance to a person.
   [[nodiscard]] double share() const { return wanted_.share; }
   [[nodiscard]] const LimiterSetup& setup() const { return setup_; }
@@ -165,10 +168,11 @@ class Limiter {
   void move_joints(const LimiterInput& input, LimiterState& state, ClampCounts& counts);
   void avoid_bodies(const LimiterInput& input, const std::vector<AxisState>& before, const BodyGaps& gaps,
                     LimiterState& state, ClampCounts& counts);
-  [[nodiscard]] double lead_target(int joint, const LimiterInput& input, ClampCounts& counts) const;
+  [[nodiscard]] double lead_target(int joint, const LimiterInput& input, ClampCounts& counts);
   [[nodiscard]] double within_torque(int joint, const LimiterInput& input, double target) const;
-  void give_way(const LimiterInput& input, LimiterState& state, ClampCounts& counts) const;
-  void write(const LimiterInput& input, const LimiterState& state, LimitedCommand& out, ClampCounts& counts) const;
+  void give_way(const LimiterInput& input, LimiterState& state, ClampCounts& counts);
+  void write(const LimiterInput& input, const LimiterState& state, LimitedCommand& out, ClampCounts& counts);
+  void count_joint_if(bool clamped, int joint, ClampReason reason, ClampCounts& counts);
   const BodyGaps& gaps_at_rest(const LimiterInput& input, const std::vector<AxisState>& joints);
   [[nodiscard]] double allowed_speed(double distance, double person_speed) const;
 
@@ -183,6 +187,7 @@ class Limiter {
   Wanted wanted_;
   std::vector<AxisState> before_;
   Eigen::VectorXd q_rest_;
+  std::vector<std::uint32_t> joint_clamps_;
 };
 
 }  // namespace duet

@@ -90,7 +90,7 @@ LimiterSetup setup_of(const Json& json, const std::string& name) {
   setup.executed.joints = json.at("joints").get<std::vector<int>>();
   setup.executed.kp = vector_of(json.at("kp"));
   setup.executed.kd = vector_of(json.at("kd"));
-  setup.executed.fixed_gains = json.at("fixed_gains");
+  setup.executed.fixed_gains = json.value("fixed_gains", false);  // older logs knew no others
   setup.dt = json.at("dt");
   setup.person = json.at("person");
   setup.human = human_of(json.at("human"), name);

@@ -1,4 +1,4 @@
-// duet hw: listen to a robot, guard it, plan for it, stop it; each says first what it will do. duet replay-log.
+// duet hw: listen to a robot, guard it, plan for it, stop it; each says first what it will do.
 #include "duet/parts/robot/hw.h"
 
 #include <fmt/format.h>
@@ -73,7 +73,8 @@ void listen_for(Session& session, const HardwareArguments& arguments, bool with_
                                 : "reads only"));
   const GuardSetup setup = guard_setup(config, true);
   std::unique_ptr<RunLog> log;  // its thread has no priority
-  if (!arguments.log.empty()) log = std::make_unique<RunLog>(arguments.log, setup);
+  if (!arguments.log.empty())
+    log = std::make_unique<RunLog>(arguments.log, setup, with_planner ? status_sender(arguments.socket) : nullptr);
   note(session, real_time_text());
   RobotSide side(config, side_options(arguments, false));
   RobotGuard guard(setup, side.connection(), side.executor());
@@ -206,7 +207,7 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   const std::string refusal = walker_refusal(config.executor, arguments.walker, is_told_velocities(arguments.walker));
   if (!refusal.empty()) throw InputError("not armed: " + refusal);
   const std::unique_ptr<Walker> walker = walker_for(arguments, setup);
-  RunLog log(arguments.log, setup);
+  RunLog log(arguments.log, setup, status_sender(arguments.socket));
   ArmingFacts facts = facts_for(config, setup, arguments, log);
   note(session,
        fmt::format("{}\nguards {}: damps it, stands it up at start, follows the planner at '{}' at A, moves only "
@@ -322,25 +323,11 @@ void add_seconds(CLI::App* app, HardwareArguments& arguments) {
   app->add_option("--seconds", arguments.seconds, "how long")->capture_default_str()->check(CLI::Range(0.1, 86400.0));
 }
 
-void run_replay(Session& session, const std::string& path) {
-  const LogReplay replay = replay_log(path);
-  print(session,
-        fmt::format("{}: {} ticks, {} with another output{}; the log {}", path, replay.ticks, replay.different,
-                    replay.dropped == 0 ? "" : fmt::format(" ({} ticks are not in it)", replay.dropped),
-                    replay.whole ? "is whole" : "was cut off"),
-        {{"ticks", replay.ticks},
-         {"different", replay.different},
-         {"dropped", replay.dropped},
-         {"whole", replay.whole},
-         {"events", replay.events}});
-  if (replay.different > 0) session.exit_code = kExitDeterminism;
-}
-
 }  // namespace
 
 void add_hardware(CLI::App& app, Session& session) {
-  CLI::App* hardware =
-      app.add_subcommand("hw", "a real G1, or its twin: check, dry-run, arm, run, stop (not safety-rated)");
+  CLI::App* hardware = app.add_subcommand(
+      "hw", "a real G1, or its twin: check, dry-run, arm, run, stop, status, report (not safety-rated)");
   hardware->require_subcommand(1);
   const auto arguments = std::make_shared<HardwareArguments>();
   CLI::App* check =
@@ -375,21 +362,13 @@ void add_hardware(CLI::App& app, Session& session) {
   }
   add_play_partner(*hardware, session);
   add_holds(*hardware, session);
+  add_log_commands(*hardware, session);
   arm->add_option("--walker", arguments->walker, "controller that keeps it on its feet (homie, wbc_sim, ...)");
   arm->add_option("--network", arguments->walker_network, "of the walker");
   arm->add_flag("--lock-step", arguments->lock_step, "by the clock of a twin that waits for each command");
   plan->add_option("--command", arguments->command, "\"vx,vy,wz\" [m/s, m/s, rad/s]")->capture_default_str();
   add_clip_options(*plan, arguments->episode);
   add_hardware_episodes(*hardware, session);
-}
-
-void add_replay_log(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "replay-log",
-                                  "pass a run's log through the limiter again: the same bits, or exit code 5",
-                                  "duet replay-log run.mcap");
-  const auto path = std::make_shared<std::string>();
-  command->add_option("log", *path, "log of `duet hw arm` or `dry-run` (MCAP)")->required();
-  command->callback([&session, path] { run_replay(session, *path); });
 }
 
 }  // namespace duet::cli

@@ -7,6 +7,7 @@
 
 #include "duet/app/command.h"
 #include "duet/hardware/guard/robot_guard.h"
+#include "duet/hardware/log/run_log.h"
 
 namespace duet::cli {
 
@@ -32,6 +33,11 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
 
 // `duet hw holds`: every cause of a hold over the twin, and whether the robot stays on its feet.
 void add_holds(CLI::App& hardware, Session& session);
+
+// `duet hw report` and `duet hw status`.
+void add_log_commands(CLI::App& hardware, Session& session);
+// Tells `duet hw status`, where it waits beside the guard's socket, how the guard is: 10 times a second.
+RunLog::Watch status_sender(const std::string& socket);
 
 // `duet hw play-partner`: a clip in the place of a camera.
 void add_play_partner(CLI::App& hardware, Session& session);

@@ -5,6 +5,7 @@
 #include "duet/core/file.h"
 #include "duet/hardware/guard/guard_message.h"
 #include "duet/hardware/log/run_log.h"
+#include "duet/hardware/log/run_report.h"
 #include "tests/fuzz/reader.h"
 #include "tests/hardware/guarded_twin.h"
 
@@ -52,10 +53,14 @@ std::string log_sample(unsigned /*seed*/) {
 
 void read_log(std::string_view bytes) { (void)recording_of_log(scratch_file("fuzz.mcap", bytes)); }
 
+void read_log_report(std::string_view bytes) { (void)report_of_log(scratch_file("fuzz.mcap", bytes)); }
+
 }  // namespace
 
 std::vector<Reader> guard_readers() {
-  return {{"guard_report", report_sample, read_report}, {"log_recording", log_sample, read_log}};
+  return {{"guard_report", report_sample, read_report},
+          {"log_recording", log_sample, read_log},
+          {"log_report", log_sample, read_log_report}};
 }
 
 }  // namespace duet::fuzz

@@ -9,6 +9,8 @@
 #include "duet/hardware/guard/guard_message.h"
 #include "duet/hardware/guard/person_input.h"
 #include "duet/hardware/guard/robot_connection.h"
+#include "duet/hardware/log/guard_health.h"
+#include "duet/hardware/log/limiter_replay.h"
 #include "duet/hardware/log/run_log.h"
 #include "duet/hardware/safety/limiter_setup_json.h"
 #include "duet/hardware/twin/fakes.h"
@@ -189,18 +191,23 @@ std::string log_sample(unsigned) {
 
 void read_log(std::string_view bytes) { (void)replay_log(scratch_file("fuzz.mcap", bytes)); }
 
+std::string health_sample(unsigned seed) {
+  HealthMessage message;
+  message.health.charge = seed;
+  message.missing = "remote_age";
+  return health_json(message).dump();
+}
+
+void read_health(std::string_view bytes) { (void)parse_health(bytes, "x"); }
+
 }  // namespace
 
 std::vector<Reader> hardware_readers() {
-  return {{"lcm_message", lcm_sample, read_lcm},
-          {"guard_message", guard_sample, read_guard},
-          {"person_estimate", person_sample, read_person},
-          {"external_pose", external_sample, read_external},
-          {"low_state", state_sample, read_low_state},
-          {"sport_answer", sport_sample, read_sport},
-          {"robot_config", config_sample, read_config},
-          {"limiter_setup", setup_sample, read_setup},
-          {"run_log", log_sample, read_log}};
+  return {{"lcm_message", lcm_sample, read_lcm},           {"guard_message", guard_sample, read_guard},
+          {"person_estimate", person_sample, read_person}, {"external_pose", external_sample, read_external},
+          {"low_state", state_sample, read_low_state},     {"sport_answer", sport_sample, read_sport},
+          {"robot_config", config_sample, read_config},    {"limiter_setup", setup_sample, read_setup},
+          {"guard_health", health_sample, read_health},    {"run_log", log_sample, read_log}};
 }
 
 }  // namespace duet::fuzz

@@ -10,6 +10,7 @@
 #include "duet/core/require.h"
 #include "duet/core/robot_state.h"
 #include "duet/hardware/episodes/guarded_episode.h"
+#include "duet/hardware/log/limiter_replay.h"
 #include "duet/hardware/log/run_log.h"
 #include "duet/hardware/twin/lock_step.h"
 #include "tests/hardware/guarded_twin.h"

@@ -1,0 +1,100 @@
+// The log of a run as programs read it that nobody here wrote: Foxglove's packages for MCAP, CDR and message
+// definitions, in Node.js. `npm ci` in viewer/ installs them; without them the test is not run.
+#include <gmock/gmock.h>
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
+
+#include "duet/core/file.h"
+#include "duet/hardware/log/run_log.h"
+#include "tests/hardware/guarded_twin.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::GuardedTwin;
+
+constexpr const char* kViewer = DUET_SOURCE_DIR "/viewer";
+
+bool packages_are_there() {
+  for (const char* package : {"@mcap/core", "@foxglove/rosmsg", "@foxglove/rosmsg2-serialization", "fzstd"})
+    if (!std::filesystem::exists(std::string(kViewer) + "/node_modules/" + package)) return false;
+  return std::system("command -v node >/dev/null 2>&1") == 0;
+}
+
+// Time [ns], 0 for a state and 1 for a command, 29 positions.
+using Row = std::array<double, 2 + kG1Motors>;
+
+template <typename Frame>
+Row row_of(double now, double kind, const Frame& frame) {
+  Row row{std::round(1e9 * now), kind};
+  for (int j = 0; j < kG1Motors; ++j) row[2 + j] = static_cast<double>(frame.motor[j].q);
+  return row;
+}
+
+// A run of 6 s with arms that move; what was read and sent.
+std::vector<Row> run_and_log(const std::string& path) {
+  std::vector<Row> rows;
+  GuardedTwin robot(test::twin_guard(), {.place_noise = 0.001, .joint_noise = 1e-3});
+  RunLog log(path, test::twin_guard());
+  const auto run_for = [&](double seconds) {
+    for (double left = seconds; left > 0.5 * GuardedTwin::kDt; left -= GuardedTwin::kDt) {
+      robot.tick();
+      log.add(robot.guard);
+      const GuardStatus& status = robot.guard.status();
+      rows.push_back(row_of(status.input.now, 0.0, status.state_frame));
+      if (status.sent) rows.push_back(row_of(status.input.now, 1.0, status.frame));
+      if (robot.ticks % 500 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(30));  // the writer's turn
+    }
+  };
+  robot.hold_key(RemoteKey::kR1);
+  run_for(2.2);
+  robot.guard.arm();
+  run_for(0.01);
+  robot.hold_key(RemoteKey::kStart);
+  run_for(0.1);
+  robot.drop_key(RemoteKey::kStart);
+  robot.hold_key(RemoteKey::kA);
+  robot.message.command.q.array() += 0.5;
+  run_for(4.0);
+  EXPECT_EQ(log.dropped(), 0);
+  return rows;
+}
+
+TEST(ForeignReader, FindsThePositionsThatWereWrittenAndSeeks) {
+  if (!packages_are_there()) GTEST_SKIP() << "not run: npm packages absent (viewer/node_modules, by npm ci)";
+  const test::ScratchFolder folder;
+  const std::vector<Row> written = run_and_log(folder / "run.mcap");
+  const std::string command = std::string("cd ") + kViewer + " && node read_log.mjs " + (folder / "run.mcap") + " " +
+                              (folder / "q.bin") + " >" + (folder / "found.json") + " 2>" + (folder / "errors");
+  ASSERT_EQ(std::system(command.c_str()), 0) << read_file(folder / "errors");
+
+  const std::string bytes = read_file(folder / "q.bin");
+  ASSERT_EQ(bytes.size(), written.size() * sizeof(Row));
+  std::vector<Row> found(written.size());
+  std::memcpy(found.data(), bytes.data(), bytes.size());
+  EXPECT_EQ(found, written);  // to the bit
+  const nlohmann::json json = nlohmann::json::parse(read_file(folder / "found.json"));
+  EXPECT_EQ(json["topics"]["rt/lowstate"].get<std::size_t>() + json["topics"]["rt/lowcmd"].get<std::size_t>(),
+            written.size());
+  EXPECT_GE(json["chunks"].get<int>(), 3);
+  EXPECT_NEAR(json["seconds"].get<double>(), 6.3, 0.1);  // no message stands before the run's time
+  EXPECT_NEAR(json["late"].get<double>(), 0.1 * 6.3 * 500.0, 5.0);
+  EXPECT_LT(json["sought"].get<double>(), 0.6 * json["size"].get<double>());
+  EXPECT_LT(json["opened"].get<double>(), 0.1 * json["size"].get<double>());
+  EXPECT_EQ(json["health"]["state"], "run");
+  const std::string elbow = test::g1()->joints[test::g1()->roles.arms[0][3]].name;
+  EXPECT_NEAR(json["limiter"]["joints"][elbow]["asked"].get<double>(),
+              test::g1()->neutral[test::g1()->roles.arms[0][3]] + 0.5, 1e-3);
+}
+
+}  // namespace
+}  // namespace duet
