@@ -199,6 +199,12 @@ PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& 
 
 std::optional<int> act_onset(ActOnset onset, const Agent& raw) { return onset_of(onset, rules::smoothed(raw), kStays); }
 
+bool partner_begins(Task task, const PointTracks& partner) {
+  const InteractionRule& rule = definition_of(task).interaction;
+  if (rule.touch != Touch::kNone || rule.onset == ActOnset::kNone) return true;
+  return act_onset(rule.onset, human_agent(partner)).has_value();
+}
+
 std::string cannot_judge(Task task, const InteractionEvidence& evidence) {
   const TaskDefinition& definition = definition_of(task);
   if (definition.rule == nullptr) return fmt::format("the task {} has no rule of its own", to_string(task));

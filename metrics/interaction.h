@@ -33,6 +33,10 @@ ActWindow act_window(const Phases& phases, double rate_hz);
 PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& robot, const HumanBody& human,
                            const ActWindow& window, double rate_hz);
 
+// Whether the partner of a clip begins the act, so that it can be answered. True for every task that takes two: nobody
+// shakes the hand of a person who does not.
+bool partner_begins(Task task, const PointTracks& partner);
+
 // The evidence of one episode that the rule looks at, at 50 Hz.
 struct InteractionEvidence {
   Agent performer, partner;                // of the whole episode

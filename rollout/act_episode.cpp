@@ -7,6 +7,7 @@
 
 #include "duet/core/numbers.h"
 #include "duet/core/robot_state.h"
+#include "duet/metrics/interaction.h"
 #include "duet/policies/language.h"
 
 namespace duet {
@@ -16,11 +17,18 @@ Episode episode_of(const RolloutSetup& setup) {
   return {setup, episode_ticks(setup), episode_partner(setup).joints, setup.driven_partner};
 }
 
+// The task's own command, where none is given; it says so where the robot has to begin.
+std::string command_of(const RolloutSetup& setup) {
+  if (!setup.prompt.empty()) return setup.prompt;
+  const std::string_view prompt = task_prompt(setup.clip->task);
+  const bool answers = partner_begins(setup.clip->task, setup.clip->partner.joints);
+  return answers ? std::string(prompt) : leading_prompt(prompt);
+}
+
 PolicyReference reference_of(const RolloutSetup& setup, Policy& policy) {
-  const Task task = setup.clip->task;
   return {policy,
-          {.context = {task, setup.prompt.empty() ? std::string(task_prompt(task)) : setup.prompt, setup.start,
-                       &setup.reference.motion, setup.seed, setup.stop_asked},
+          {.context = {setup.clip->task, command_of(setup), setup.start, &setup.reference.motion, setup.seed,
+                       setup.stop_asked},
            .seen_partner = setup.seen_partner,
            .perception = setup.perturbation.perception,
            .perception_seed = setup.perturbation_seed,

@@ -21,7 +21,8 @@ namespace duet {
 struct RolloutSetup : EpisodeConditions {
   const PairedMotion* clip = nullptr;
   AdaptedMotion reference;  // the robot's side after A.4.4; frame 0 is tick 0
-  std::string prompt;       // the policy's language command; empty: the task's own
+  std::string
+      prompt;  // the policy's language command; empty: the task's own, "... first" where the partner does not begin
   // The partner that the policy sees in the place of the real one; frame 0 is tick 0, the last one stands. Empty:
   // the real one.
   PointTracks seen_partner;

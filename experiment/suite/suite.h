@@ -156,7 +156,7 @@ struct SuitePolicy {
   std::string name;        // in rows and tables; once per suite
   std::string use = name;  // for policy_maker
   PolicyOptions options = {};
-  std::string prompt = {};        // the language command; empty: the task's own (task_prompt)
+  std::string prompt = {};        // the language command; empty: the task's own (rollout/act_episode.h)
   bool shuffled_partner = false;  // sees the partner of another clip of the task: whether it looks at its partner
   Tags tags = {};                 // of its rows (core/task.h); no part of what it is
 };

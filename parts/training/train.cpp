@@ -253,7 +253,8 @@ void make_small(DstarArguments& arguments) {
 // Settles the options that depend on the machine and on other options.
 void settle(DstarArguments& arguments) {
   arguments.run.threads = arguments.data.threads = arguments.threads.value_or(default_threads());
-  arguments.data.answers = arguments.start == TrainingStart::kAnswer;
+  arguments.data.leads = arguments.start == TrainingStart::kLead;
+  arguments.data.answers = arguments.data.leads || arguments.start == TrainingStart::kAnswer;
   if (arguments.start != TrainingStart::kSimToReal) return;
   arguments.data.start = StartMode::kSimToReal;
   arguments.data.starts = 1;  // they are all the same

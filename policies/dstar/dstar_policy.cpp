@@ -42,10 +42,10 @@ class DstarPolicy final : public Policy {
   [[nodiscard]] std::string_view name() const override { return name_; }
 
   void reset(const EpisodeContext& context) override {
-    if (context.prompt.empty() || context.prompt == task_prompt(context.task))  // else the words say what to do
+    const std::string prompt = command(context);
+    if (prompt == task_prompt(context.task))  // else the words say what to do
       require_known_task(name_, kPaperTasks, context.task);
-    if (network_->config.language_on)
-      embedding_ = language_->embed(context.prompt.empty() ? task_prompt(context.task) : context.prompt);
+    if (network_->config.language_on) embedding_ = language_->embed(prompt);
     random_ = Random(context.seed, stream_key({"policy", "noise"}));
     draw();
     drawn_ = true;
@@ -74,6 +74,12 @@ class DstarPolicy final : public Policy {
   [[nodiscard]] PolicyFaults faults() const override { return faults_; }
 
  private:
+  // A network that learnt only to answer is told what it knows.
+  [[nodiscard]] std::string command(const EpisodeContext& context) const {
+    const std::string prompt(task_prompt(context.task));
+    if (context.prompt.empty()) return prompt;
+    return context.prompt == leading_prompt(prompt) && !network_->notes.contains(kBegins) ? prompt : context.prompt;
+  }
   void draw() {
     for (float& value : noise_) value = static_cast<float>(sampling_.temperature * random_.normal());
   }

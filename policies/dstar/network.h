@@ -14,6 +14,8 @@
 
 namespace duet {
 
+// The note of a network that learnt to begin where the command ends in "first".
+inline constexpr const char* kBegins = "begins";
 inline constexpr double kPlanGoldenError = 1e-4;  // of a normalised plan at load
 
 // Everything a file holds. Tensor names and shapes: docs/file-formats.md; weights are (out, in), row-major.
@@ -26,7 +28,7 @@ struct DstarNetwork {
   Eigen::VectorXf frame_mean, frame_deviation;  // 149: input' = (input - mean) / deviation, clipped to +-10
   Eigen::VectorXf plan_mean, plan_deviation;    // 180
   std::string language;                         // which encoder its embeddings are of ("duet-text-1")
-  std::map<std::string, std::string> notes;     // seed, windows, epochs, data, split digest: for people
+  std::map<std::string, std::string> notes;     // seed, windows, epochs, data, split digest: for people; kBegins
 };
 
 // The input and the output of one evaluation, in the network's own units.

@@ -147,7 +147,37 @@ TEST(MakeDemonstrations, InAnswerTheRobotBeginsAfterItsPartner) {
   EXPECT_GE(both, 18);  // of 36; hands are half up in the first frame of some recordings
 }
 
+TEST(MakeDemonstrations, WhereItLeadsThePartnerWaitsOnAndTheRobotActsAtOnceAndAgain) {
+  DemonstrationOptions options = unfollowed(Likeness::kPeople, 8);
+  options.answers = options.leads = true;
+  const DemonstrationSet set = made(options);
+  EXPECT_THAT(set.origin, testing::HasSubstr("in answer to the partner or to begin"));
+  int leads = 0, gestures = 0;
+  for (const Demonstration& entry : set.list) {
+    const bool gesture = entry.task == Task::kWave || entry.task == Task::kBend || entry.task == Task::kFlyKiss;
+    gestures += gesture ? 1 : 0;
+    if (!entry.leads) continue;
+    EXPECT_TRUE(gesture) << entry.clip_id;
+    ++leads;
+    PointTracks partner(entry.frames, kSmplJoints);
+    RobotMotion robot{kTickRate, test::g1()->joint_names(), {}, Eigen::MatrixXd(test::g1()->dof(), entry.frames)};
+    for (int t = 0; t < entry.frames; ++t) {
+      const Reference meant = set.reference(entry.begin + t);
+      robot.root.push_back(meant.X_WB);
+      robot.q.col(t) = meant.q;
+      partner.frame(t) = set.partner.col(entry.begin + t).cast<double>().reshaped(3, kSmplJoints);
+    }
+    EXPECT_TRUE(!partner_begins(entry.task, partner)) << entry.clip_id;
+    EXPECT_LE((robot.root[entry.phases.act_begin].p - robot.root[entry.phases.act_begin - 20].p).norm(), 1e-6);
+    for (int t = 1; t < entry.frames; ++t)
+      ASSERT_LE((robot.q.col(t) - robot.q.col(t - 1)).cwiseAbs().maxCoeff(), 0.5) << entry.clip_id << " " << t;
+  }
+  EXPECT_GE(leads, 4);
+  EXPECT_LT(leads, gestures);
+}
+
 // All joints ramp from 0 to 1 within the act.
+
 AdaptedMotion ramp() {
   constexpr int kFrames = 300, kBegin = 100, kEnd = 200;
   AdaptedMotion meant{{kTickRate, test::g1()->joint_names(), {}, Eigen::MatrixXd::Zero(test::g1()->dof(), kFrames)},
@@ -169,6 +199,19 @@ TEST(LateAct, IsPutOffByWhatTheRobotWasLate) {
   EXPECT_EQ(late.motion.root[119].p.x(), 100.0);  // waits
   EXPECT_EQ(late.motion.root[299].p.x(), 279.0);  // and does the rest
   EXPECT_EQ(put_off(meant, 0).motion.q, meant.motion.q);
+}
+
+TEST(BegunAtOnce, RepeatsTheActUntilTheEnd) {
+  AdaptedMotion waits = ramp();
+  for (int t = 40; t < 100; ++t) waits.motion.root[t] = waits.motion.root[100];  // there after 40 frames
+  const AdaptedMotion made = begun_at_once(waits, *test::g1());
+  EXPECT_EQ(made.phases.act_begin, 65);
+  EXPECT_EQ(made.motion.q.col(64), waits.motion.q.col(64));
+  for (const int t : {0, 50, 149}) EXPECT_EQ(made.motion.q.col(65 + t), waits.motion.q.col(100 + t)) << t;
+  EXPECT_EQ(made.motion.q.col(65 + 150 + 24), waits.motion.q.col(99));  // back where the act begins
+  EXPECT_EQ(made.motion.q.col(65 + 175), waits.motion.q.col(100));      // and again
+  EXPECT_EQ(made.phases.act_end, 300);
+  EXPECT_EQ(begun_at_once(ramp(), *test::g1()).motion.q, ramp().motion.q);  // never waits
 }
 
 TEST(MakeDemonstrations, BeforeAStillPartnerNobodyBeginsUntilHeHasLookedForFiveSeconds) {

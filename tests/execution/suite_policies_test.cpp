@@ -311,6 +311,20 @@ TEST_F(ShuffledPartner, PromptIsTheTasksUnlessTheSuiteSaysAnother) {
   EXPECT_EQ(watcher.prompt, "hug them");
 }
 
+TEST_F(ShuffledPartner, PromptSaysSoWhereThePartnerDoesNotBegin) {
+  take_clips(2);
+  PairedMotion still = clips()[0];
+  for (int t = 1; t < still.partner.frames(); ++t) still.partner.joints.frame(t) = still.partner.joints.frame(0);
+  EpisodeSpec led = spec(0);
+  led.clip = &still;
+  Watcher watcher;
+  watch(led, watcher);
+  EXPECT_EQ(watcher.prompt, "wave to the person first");
+  still.task = Task::kHandshake;  // which nobody does alone
+  watch(led, watcher);
+  EXPECT_EQ(watcher.prompt, "shake hands with the person");
+}
+
 TEST(SuitePolicies, AnOptionThatIsNoValueIsRefusedWithItsLine) {
   EXPECT_SENTENCE(refusal("\n  - replay\n  - {name: blind, use: replay,\n     options: {prompt: [1]}}"));
 }

@@ -137,6 +137,19 @@ TEST(DstarPolicy, HeedsThePromptAndElseTheTask) {
   EXPECT_THROW(policy->reset(context_of(1, "?")), std::invalid_argument);
 }
 
+TEST(DstarPolicy, BeginsOnCommandWhereItLearntToAndElseAnswers) {
+  const std::string first = leading_prompt(task_prompt(Task::kHug));
+  DstarNetwork network = random_dstar_network(policy_config(), *g1(), 1);
+  const auto told = [&](const std::string& prompt) {
+    return episode(
+        *make_dstar_policy("dstar", g1(), std::make_shared<const DstarNetwork>(network), built_in_language()),
+        context_of(1, prompt));
+  };
+  EXPECT_EQ(told(first), told(""));
+  network.notes[kBegins] = "half of the gestures";
+  EXPECT_NE(told(first), told(""));
+}
+
 TEST(DstarPolicy, LeavesOutAPlanOfWhatIsNotANumberAndGoesOn) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const auto policy = make();

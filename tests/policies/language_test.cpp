@@ -153,6 +153,15 @@ TEST(Language, EveryCommandOfTheSixGivesTheBitsThatNetworksLearntFrom) {
   EXPECT_EQ(hash.hex(), "23ab26d928aae0b54228ee4f914e6e5b3d0887a74316ae6cd812534e9cb73e87");
 }
 
+TEST(Language, TheCommandToBeginIsTheSameTasksAndAnotherCommand) {
+  const auto encoder = built_in_language();
+  for (const Task task : kPaperTasks) {
+    const std::string leads = leading_prompt(task_prompt(task));
+    EXPECT_EQ(nearest_task(*encoder, leads), task);
+    EXPECT_LT(cosine(encoder->embed(leads), encoder->embed(task_prompt(task))), 0.99);
+  }
+}
+
 TEST(Language, CaseOrderAndPunctuationDoNotMatter) {
   const auto encoder = built_in_language();
   EXPECT_EQ(encoder->embed("High-FIVE them!"), encoder->embed("high five, them"));

@@ -153,7 +153,24 @@ TEST(Windows, WithoutAugmentationAreTheDemonstrationInTheRobotsFrame) {
   EXPECT_NEAR(plan[4 * 36 + 7 + 15], 0.002F * 125, 1e-5F);
   EXPECT_EQ(made.batch.phase[0], 0);
   EXPECT_EQ(made.batch.phase[1], 1);
-  EXPECT_EQ(made.batch.prompt[0], -1);
+  EXPECT_EQ(made.batch.prompt[0], 0);
+}
+
+TEST(Windows, OfOneWhoLeadsHaveCommandsThatSayIt) {
+  DemonstrationSet set = made_set(*test::g1());
+  for (Demonstration& entry : set.list) entry.leads = true;
+  const std::vector<std::string> commands = commands_of(set.list[0].task, true);
+  EXPECT_EQ(commands.size(), 2 * commands_of(set.list[0].task, false).size());
+  WindowBatch batch;
+  batch.resize(1);
+  for (const bool augment : {false, true}) {
+    WindowMaker maker(test::g1(), set, {.augment = augment});
+    for (int i = 0; i < 20; ++i) {
+      Random random(i, 1);
+      maker.make({0, 25}, random, batch, 0);
+      EXPECT_THAT(commands.at(batch.prompt[0]), testing::EndsWith(" first"));
+    }
+  }
 }
 
 TEST(Windows, LookBackByTheStrideOfTheLongStream) {

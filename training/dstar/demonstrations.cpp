@@ -18,7 +18,7 @@ namespace {
 
 // A file made here may be larger than one of somebody else: 2,000 clips are 2.5 GB.
 constexpr std::int64_t kMostDemonstrationBytes = std::int64_t{1} << 35;
-constexpr const char* kFormat = "duet.demonstrations/2";
+constexpr const char* kFormat = "duet.demonstrations/3";
 constexpr int kPartnerSize = 3 * kSmplJoints;
 
 // Keeps the memory of hours of frames from being copied at each demonstration.
@@ -38,11 +38,9 @@ Pose read_pose(const Eigen::Ref<const Eigen::VectorXf>& in) {
 }
 
 nlohmann::json json_of(const Demonstration& entry) {
-  return {{"clip", entry.clip_id},
-          {"digest", entry.digest},
-          {"task", to_string(entry.task)},
-          {"act", {entry.phases.act_begin, entry.phases.act_end}},
-          {"frames", entry.frames}};
+  return {{"clip", entry.clip_id},         {"digest", entry.digest},
+          {"task", to_string(entry.task)}, {"act", {entry.phases.act_begin, entry.phases.act_end}},
+          {"leads", entry.leads},          {"frames", entry.frames}};
 }
 
 std::vector<Demonstration> list_of(const std::string& text, const std::string& path) {
@@ -55,6 +53,7 @@ std::vector<Demonstration> list_of(const std::string& text, const std::string& p
                           item.at("digest"),
                           parse_task(item.at("task").get<std::string>()),
                           {item.at("act").at(0), item.at("act").at(1)},
+                          item.at("leads"),
                           begin,
                           item.at("frames")};
       require(entry.frames > 0, "a demonstration without frames");

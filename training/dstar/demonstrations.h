@@ -17,6 +17,7 @@ struct Demonstration {
   std::string digest;  // SHA-256 of the clip that it comes from: splits are told apart by it
   Task task = Task::kHug;
   Phases phases;
+  bool leads = false;         // the robot begins, before a partner who goes on waiting: the command says so
   int begin = 0, frames = 0;  // columns of the set; 50 Hz
 
   [[nodiscard]] int end() const { return begin + frames; }

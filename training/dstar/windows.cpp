@@ -80,6 +80,14 @@ void bound(Eigen::Quaterniond& R, double heading, double angle) {
 
 }  // namespace
 
+std::vector<std::string> commands_of(Task task, bool leads) {
+  std::vector<std::string> commands = {std::string(task_prompt(task))};
+  for (const std::string_view text : task_paraphrases(task)) commands.emplace_back(text);
+  const std::size_t answering = commands.size();
+  for (std::size_t i = 0; leads && i < answering; ++i) commands.push_back(leading_prompt(commands[i]));
+  return commands;
+}
+
 std::vector<int> loss_frames(const RobotModel& robot) {
   std::vector<int> frames;
   for (const int joint : loss_joints()) {
@@ -110,7 +118,7 @@ void WindowBatch::resize(int windows) {
   partner.resize(kAnchors * kLossPoints * 3, windows);
   phase.assign(windows, 0);
   task.assign(windows, 0);
-  prompt.assign(windows, -1);
+  prompt.assign(windows, 0);
 }
 
 std::vector<Window> list_windows(const DemonstrationSet& set, const WindowOptions& options) {
@@ -149,7 +157,8 @@ void WindowMaker::misplace(const Demonstration& entry, int frame, Random& random
   add_offsets(kMisplaced, scale, random, always);
   add_offsets(kMisplacedWaiting, scale, random, waiting);
   const auto put = [&](ObservationFrame& seen, int at) {
-    const double share = std::clamp(1.0 - static_cast<double>(at - entry.phases.act_begin) / kArmsSettle, 0.0, 1.0);
+    const double share =
+        entry.leads ? 1.0 : std::clamp(1.0 - static_cast<double>(at - entry.phases.act_begin) / kArmsSettle, 0.0, 1.0);
     seen.partner += always + share * waiting;
   };
   for (int i = 0; i < kHistoryFrames; ++i) {
@@ -242,7 +251,8 @@ void WindowMaker::make(const Window& window, Random& random, WindowBatch& batch,
   batch.phase[column] = static_cast<int>(entry.phases.at(frame));
   batch.task[column] = entry.task.index();
   const int paraphrases = static_cast<int>(task_paraphrases(entry.task).size());
-  batch.prompt[column] = options_.augment && random.chance(0.5) ? random.below(paraphrases) : -1;
+  batch.prompt[column] = options_.augment && random.chance(0.5) ? 1 + random.below(paraphrases) : 0;
+  if (entry.leads) batch.prompt[column] += 1 + paraphrases;
 }
 
 void draw_windows(WindowMaker& maker, const std::vector<Window>& windows, Random& random, WindowBatch& batch) {

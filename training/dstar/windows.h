@@ -34,6 +34,9 @@ struct WindowOptions {
   double turn_reach = 0.3, turn_rate = 0.8;  // [rad], [rad/s]
 };
 
+// The commands of a task that training uses: its prompt, paraphrases, and with `leads` each of them for one who begins.
+std::vector<std::string> commands_of(Task task, bool leads);
+
 // Keypoints whose places L_pos and L_spatial compare: of the robot and of the partner.
 inline constexpr int kLossPoints = 7;  // head, shoulders, elbows, hands
 std::vector<int> loss_frames(const RobotModel& robot);
@@ -51,7 +54,7 @@ struct WindowBatch {
   Eigen::MatrixXf plan;           // (180, size): encode_plan
   Eigen::MatrixXf partner;        // (kAnchors * kLossPoints * 3, size): where the partner's points will be, in E
   std::vector<int> phase;         // 0, 1, 2
-  std::vector<int> task, prompt;  // prompt: index into task_paraphrases, -1 for task_prompt
+  std::vector<int> task, prompt;  // prompt: index into commands_of
   void resize(int windows);
 };
 

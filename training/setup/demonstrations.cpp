@@ -36,6 +36,7 @@ constexpr double kSlowWalk = 0.25, kQuickWalk = 0.5;          // [m/s]
 // One motion to be followed, beside its partner.
 struct Take {
   const PairedMotion* clip = nullptr;
+  std::shared_ptr<const PairedMotion> waiting;  // the clip as it is seen where the robot leads
   AdaptedMotion adapted;
   PointTracks partner;
   std::vector<RobotState> followed;  // in the engine, while it was upright
@@ -57,12 +58,18 @@ Take take_of(const PairedMotion& clip, const RobotModel& robot, const Demonstrat
   Take take;
   take.clip = &clip;
   Random random(seed, stream_key({"answers"}));
+  const bool gesture = definition_of(clip.task).interaction.touch == Touch::kNone;
   AdaptationOptions adaptation{.start = options.start};
   if (options.answers) adaptation.walks = random.uniform(kSlowWalk, kQuickWalk);
   take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, adaptation, seed);
-  if (options.answers) take.adapted.clip_frame += ahead(clip, take.adapted.motion, robot, random);
-  take.partner = partner_motion(clip.partner, std::nullopt, take.adapted.phases, take.adapted.clip_frame,
-                                take.adapted.motion.frames())
+  if (options.leads && gesture && (random.chance(0.5) || !partner_begins(clip.task, clip.partner.joints))) {
+    take.waiting = std::make_shared<const PairedMotion>(with_waiting_partner(clip));
+    take.adapted = begun_at_once(take.adapted, robot);
+  } else if (options.answers) {
+    take.adapted.clip_frame += ahead(clip, take.adapted.motion, robot, random);
+  }
+  take.partner = partner_motion(take.waiting ? take.waiting->partner : clip.partner, std::nullopt, take.adapted.phases,
+                                take.adapted.clip_frame, take.adapted.motion.frames())
                      .joints;
   return take;
 }
@@ -84,7 +91,7 @@ void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const De
             const PolicyMaker& make_policy, const LoadedController& make_controller) {
   const std::unique_ptr<Policy> policy = make_policy();
   RolloutSetup setup;
-  setup.clip = take.clip;
+  setup.clip = take.waiting ? take.waiting.get() : take.clip;
   setup.reference = take.adapted;
   setup.start = robot->standing_state(take.adapted.motion.root.front());
   setup.fall = robot->fall;
@@ -112,7 +119,8 @@ RobotMotion begin_of(const RobotMotion& motion, int frames) {
 }
 
 void add(const Take& take, bool as_it_is, DemonstrationSet& set) {
-  const Demonstration entry{take.clip->clip_id, clip_digest(*take.clip), take.clip->task, take.adapted.phases};
+  const Demonstration entry{take.clip->clip_id, clip_digest(*take.clip), take.clip->task, take.adapted.phases,
+                            take.waiting != nullptr};
   const RobotMotion& motion = take.adapted.motion;
   if (as_it_is) set.add(entry, states_of(motion), motion, take.partner);
   const int frames = std::min(static_cast<int>(take.followed.size()), motion.frames());
@@ -204,6 +212,49 @@ AdaptedMotion put_off(const AdaptedMotion& meant, int frames) {
   return late;
 }
 
+PairedMotion with_waiting_partner(const PairedMotion& clip) {
+  constexpr int kBefore = 15, kSwing = 100;  // frames before the act in which he moves already; that he waits over
+  PairedMotion waiting = clip;
+  PointTracks& joints = waiting.partner.joints;
+  const std::optional<int> begins =
+      act_onset(definition_of(clip.task).interaction.onset, human_agent(clip.partner.joints));
+  const int still = std::max(1, begins ? *begins - kBefore : joints.frames());
+  const int swing = std::min(still, kSwing), period = std::max(1, 2 * (swing - 1));
+  for (int t = still; t < joints.frames(); ++t) {
+    const int at = (t - still + 1) % period;  // back from the last of them
+    const int source = still - 1 - std::min(at, period - at);
+    joints.frame(t) = clip.partner.joints.frame(source);
+    for (int j = 0; !waiting.partner.rotations.empty() && j < kSmplJoints; ++j)
+      waiting.partner.rotations[t * kSmplJoints + j] = clip.partner.rotations[source * kSmplJoints + j];
+  }
+  return waiting;
+}
+
+AdaptedMotion begun_at_once(const AdaptedMotion& waits, const RobotModel& robot) {
+  constexpr int kPause = 25, kReturn = 50;  // frames
+  const RobotMotion& from = waits.motion;
+  const int last = from.frames(), act = waits.phases.act_begin, until = std::min(last, waits.phases.act_end + kReturn);
+  int there = act;
+  while (there > 0 && from.root[there - 1].p == from.root[act].p) --there;
+  if (there + kPause >= act) return waits;
+  AdaptedMotion made = waits;
+  made.phases.act_begin = there + kPause;
+  for (int begin = made.phases.act_begin; begin < last; begin += until - act + kPause) {
+    for (int t = begin; t < std::min(last, begin + until - act); ++t) {
+      made.motion.root[t] = from.root[act + t - begin];
+      made.motion.q.col(t) = from.q.col(act + t - begin);
+    }
+    made.phases.act_end = std::min(last, begin + waits.phases.act_end - act);
+    const int rests = begin + until - act;  // and goes back to where the act begins
+    for (int t = rests; t < std::min(last, rests + kPause); ++t) {
+      const double s = (t - rests + 1.0) / kPause;
+      made.motion.root[t] = interpolate(from.root[until - 1], from.root[act - 1], s);
+      made.motion.q.col(t) = (1.0 - s) * from.q.col(until - 1) + s * from.q.col(act - 1);
+    }
+  }
+  return made;
+}
+
 std::string origin_of(const DemonstrationOptions& options) {
   std::string clips;
   for (const auto& [like, per_task] : options.clips)
@@ -214,6 +265,7 @@ std::string origin_of(const DemonstrationOptions& options) {
   clips += fmt::format(" (seed {}), retargeted by {}, {} start{} of each{}", options.seed, options.pair_mode,
                        options.starts, options.starts == 1 ? "" : "s",
                        options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)"
+                       : options.leads                        ? " in answer to the partner or to begin"
                        : options.answers                      ? " in answer to the partner"
                                                               : "");
   if (options.engine.empty()) return clips + ", none followed";

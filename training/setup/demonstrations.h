@@ -30,6 +30,7 @@ struct DemonstrationOptions {
   int starts = 2;                          // of each clip, drawn as A.4.4 has it
   StartMode start = StartMode::kApproach;  // or kSimToReal: Algorithm 7, whose starts are all the same
   bool answers = false;                    // it comes early and waits, and begins after its partner (kApproach)
+  bool leads = false;                      // with `answers`: but half of the gestures are its to begin
   int followed = 200;  // clips of each kind and task whose first start is also followed in the engine
   std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
   std::string controller_network;                         // its option `network`; empty: the one it has by itself
@@ -59,6 +60,12 @@ int act_lag(const AdaptedMotion& meant, const std::vector<RobotState>& did, cons
 // The act and what follows so many frames later; the robot goes on waiting until then. A robot that acts late is not
 // asked to be done at the time that was meant: that would teach it to leave the act out.
 AdaptedMotion put_off(const AdaptedMotion& meant, int frames);
+
+// The partner goes on waiting: frames before he begins, or all where he does not, to and fro.
+PairedMotion with_waiting_partner(const PairedMotion& clip);
+// The act of a motion that comes early and waits, done as soon as the robot is there and again until the end, half a
+// second apart. Its phases are those of all of them together.
+AdaptedMotion begun_at_once(const AdaptedMotion& waits, const RobotModel& robot);
 
 // "digest  clip_id" of every clip of a suite, with a first line that says which: the content of a test split.
 std::string split_text(const Suite& suite, int threads, Progress& progress);

@@ -83,9 +83,9 @@ FieldTable<PolicyTraining> demonstration_fields() {
       field<T>(
           {.name = "start",
            .meaning = "how the robot comes: approach (A.4.4), sim_to_real (Algorithm 7, before it meets the real "
-                      "robot: one start) or answer (as approach, but it is there early, waits, and begins after its "
-                      "partner)",
-           .choices = {"approach", "sim_to_real", "answer"}},
+                      "robot: one start), answer (as approach, but it is there early, waits, and begins after its "
+                      "partner) or lead (as answer, but half of the gestures are its to begin: the command says so)",
+           .choices = {"approach", "sim_to_real", "answer", "lead"}},
           [](auto& t) -> auto& { return t.start; }),
       field<T>(
           {.name = "followed",

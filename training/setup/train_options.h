@@ -23,7 +23,7 @@ struct WbcTraining {
 };
 const FieldTable<WbcTraining>& wbc_training_fields();
 
-enum class TrainingStart { kApproach, kSimToReal, kAnswer };
+enum class TrainingStart { kApproach, kSimToReal, kAnswer, kLead };
 
 // `duet train dstar`, of its variants and of `retrieval`.
 struct PolicyTraining {

@@ -183,15 +183,14 @@ torch::Tensor normal_noise(at::IntArrayRef shape, Random& random) {
   return noise;
 }
 
-Units::Units(const WindowStatistics& statistics, const LanguageEncoder& encoder)
+Units::Units(const WindowStatistics& statistics, const LanguageEncoder& encoder, bool leads)
     : frame_mean_(vector_tensor(statistics.frame_mean)),
       frame_deviation_(vector_tensor(statistics.frame_deviation)),
       mean_(vector_tensor(statistics.plan_mean).view({kAnchors, kAnchorSize})),
       deviation_(vector_tensor(statistics.plan_deviation).view({kAnchors, kAnchorSize})) {
   for (const Task task : kPaperTasks) {
-    std::vector<std::vector<float>> rows = {encoder.embed(task_prompt(task))};
-    for (const std::string_view text : task_paraphrases(task)) rows.push_back(encoder.embed(text));
-    prompts_.push_back(std::move(rows));
+    std::vector<std::vector<float>>& rows = prompts_.emplace_back();
+    for (const std::string& command : commands_of(task, leads)) rows.push_back(encoder.embed(command));
   }
 }
 
@@ -204,7 +203,7 @@ torch::Tensor Units::language(const WindowBatch& batch) const {
   const auto size = static_cast<std::int64_t>(prompts_[0][0].size());
   torch::Tensor rows = torch::empty({batch.size, size});
   for (int i = 0; i < batch.size; ++i) {
-    const std::vector<float>& row = prompts_[batch.task[i]][batch.prompt[i] + 1];
+    const std::vector<float>& row = prompts_[batch.task[i]][batch.prompt[i]];
     std::copy(row.begin(), row.end(), rows.data_ptr<float>() + size * i);
   }
   return rows;

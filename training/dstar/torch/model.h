@@ -50,7 +50,7 @@ torch::Tensor normal_noise(at::IntArrayRef shape, Random& random);
 // The units of a network: what it sees of a batch, and what its plans mean.
 class Units {
  public:
-  Units(const WindowStatistics& statistics, const LanguageEncoder& encoder);
+  Units(const WindowStatistics& statistics, const LanguageEncoder& encoder, bool leads);  // leads: see commands_of
 
   [[nodiscard]] ModelInput input(WindowBatch& batch) const;
   [[nodiscard]] torch::Tensor normalised(const torch::Tensor& plan) const { return (plan - mean_) / deviation_; }
@@ -61,7 +61,7 @@ class Units {
   [[nodiscard]] torch::Tensor language(const WindowBatch& batch) const;
 
   torch::Tensor frame_mean_, frame_deviation_, mean_, deviation_;  // the last two (5, 36), of plans
-  std::vector<std::vector<std::vector<float>>> prompts_;           // per task: the prompt, then its paraphrases
+  std::vector<std::vector<std::vector<float>>> prompts_;           // per task: commands_of
 };
 
 // All weights of a network in one run of numbers, with views by name: what Adam, the running average and checkpoints

@@ -85,7 +85,7 @@ class Trainer {
     statistics_ = window_statistics(maker, windows_, run.seed);
     weights_.initialise(run.seed);
     if (run.from) begin_with(*run.from);
-    units_ = std::make_unique<Units>(statistics_, *data.language);
+    units_ = std::make_unique<Units>(statistics_, *data.language, leads());
     for (int i = 0; i < run.threads; ++i) lanes_.push_back(std::make_unique<Lane>(data, run));
     std::copy(weights_.data(), weights_.data() + weights_.size(), average_.data());
     fill_validation();
@@ -140,6 +140,7 @@ class Trainer {
                      {"windows", std::to_string(windows_.size())},
                      {"demonstrations", std::to_string(data_.train->list.size())},
                      {"device", device_.str()}};
+    if (leads()) network.notes[kBegins] = "half of the gestures";
     return network;
   }
 
@@ -172,6 +173,8 @@ class Trainer {
     WindowBatch windows, later;  // later: the first ones half a second on
     LossParts parts;
   };
+
+  [[nodiscard]] bool leads() const { return std::ranges::any_of(data_.train->list, &Demonstration::leads); }
 
   void begin_with(const DstarNetwork& network) {
     const std::string expected = to_json_text(run_.config), found = to_json_text(network.config);
@@ -341,7 +344,7 @@ double Trainer::restore() {
     std::copy(values.begin(), values.end(), out);
   };
   for (const auto& [name, values] : normalisers()) *values = vector_of(file, name, values->size(), path);
-  units_ = std::make_unique<Units>(statistics_, *data_.language);
+  units_ = std::make_unique<Units>(statistics_, *data_.language, leads());
   load("weights", weights_.data());
   load("average", average_.data());
   load("adam.m", m_.data());
