@@ -73,6 +73,25 @@ TEST(PeopleTable, TheIntervalIsNewcombes) {
   EXPECT_NEAR(difference.interval.high, 0.3339, kPrinted);
 }
 
+// Four draws of the same clips that all end alike tell no more than one.
+TEST(PeopleTable, DrawsOfAClipAreNoOtherClips) {
+  std::vector<EpisodeRow> rows = both_kinds();
+  const Estimate once = estimate(people_analysis(rows), {.task = "hug", .of = "recorded", .name = "success"});
+  const std::size_t one_draw = rows.size();
+  for (int draw = 1; draw < 4; ++draw)
+    for (std::size_t i = 0; i < one_draw; ++i) {
+      EpisodeRow row = rows[i];
+      row.episode = draw;
+      row.key = episode_key(row);
+      rows.push_back(row);
+    }
+  const Estimate often = estimate(people_analysis(rows), {.task = "hug", .of = "recorded", .name = "success"});
+  EXPECT_EQ(often.n, 16);
+  EXPECT_DOUBLE_EQ(often.value, once.value);
+  EXPECT_NEAR(often.interval.low, once.interval.low, 1e-12);
+  EXPECT_NEAR(often.interval.high, once.interval.high, 1e-12);
+}
+
 TEST(PeopleTable, PerturbedAndUnsupportedEpisodesAreLeftOut) {
   std::vector<EpisodeRow> rows = both_kinds();
   rows[0].perturbation = "push";

@@ -11,6 +11,7 @@
 #include "duet/core/recording.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/experiment/work/run_work.h"
+#include "duet/motion/paired_motion.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/policies/policy.h"
 #include "duet/robots/robot_model.h"

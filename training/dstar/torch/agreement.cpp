@@ -16,7 +16,7 @@ double runner_difference(const DstarData& data, const DstarRun& run, const std::
   for (const auto& [name, tensor] : network->weights)
     weights[name] = torch::from_blob(const_cast<float*>(tensor.values.data()), tensor.shape).clone();
   const Units units({network->frame_mean, network->frame_deviation, network->plan_mean, network->plan_deviation},
-                    *data.language);
+                    *data.language, network->notes.contains(kBegins));
   WindowOptions options = windows_of(run);
   options.augment = false;
   WindowMaker maker(data.robot, *data.validation, options);
