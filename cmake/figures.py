@@ -149,6 +149,24 @@ def rule(folder):
     return markdown(header, [False] + [True] * 13, table)
 
 
+def people(folder, run):
+    """Success of each policy on recorded people and on synthetic ones like them, by clip; beside it what the detectors that ask for less say of the former."""
+    file, rows, table = f"{folder}/people.csv", rows_of(folder, "people.csv"), []
+    recorded = [row for row in rows_in(run) if row["tags"]["clip.people"] == "recorded"]
+    tasks = {task: title for task, title in TASKS.items() if task in {r["task"] for r in rows}}
+    for policy, name in policies_and_controls({r["policy"] for r in rows}).items():
+        def value(task, of="recorded", name="success"):
+            return figure(rows, file, policy=policy, task=task, of=of, name=name)
+        own = [row for row in recorded if row["policy"] == policy]
+        less = sum(v["success"] and row["outcome"] == "ok" for row in own for v in row["verdicts"] if (v["version"], v["thresholds"]) == ("robot", "paper"))
+        difference = value("all", "", "recorded_minus_synthetic")
+        low, high = (f"{100 * float(difference[side]):+.1f}" for side in ("low", "high"))
+        table.append([name, str(len(own)), with_interval(value("all")), *[with_interval(value(task)) for task in tasks], f"{100 * less / len(own):.1f}",
+                      percent(value("all", name="falls")["value"]), with_interval(value("all", "synthetic")), f"{100 * float(difference['value']):+.1f} [{low}, {high}]"])
+    header = ["Policy", "n", "Recorded: overall", *tasks.values(), "robot/paper", "Fell", "Synthetic: overall", "Recorded - synthetic"]
+    return markdown(header, [False] + [True] * (len(header) - 1), table)
+
+
 def rows_in(folder):
     path = ROOT / folder / "episodes.jsonl"
     if not path.is_file():
@@ -320,11 +338,13 @@ def contents(source, program):
         return actuation_walkers(words[1], program)
     if words[:1] in (["own_worlds"], ["own_worlds_paired"]) and len(words) > 2:
         return (own_worlds if words[0] == "own_worlds" else own_worlds_paired)(*words[1:])
+    if words[:1] == ["people"] and len(words) == 3:
+        return people(*words[1:])
     tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
               "actuation": actuation}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, pictures FILE, actuation RUN, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, pictures FILE, actuation RUN, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):
