@@ -204,14 +204,14 @@ TEST(LateAct, IsPutOffByWhatTheRobotWasLate) {
 TEST(BegunAtOnce, RepeatsTheActUntilTheEnd) {
   AdaptedMotion waits = ramp();
   for (int t = 40; t < 100; ++t) waits.motion.root[t] = waits.motion.root[100];  // there after 40 frames
-  const AdaptedMotion made = begun_at_once(waits, *test::g1());
+  const AdaptedMotion made = begun_at_once(waits);
   EXPECT_EQ(made.phases.act_begin, 65);
   EXPECT_EQ(made.motion.q.col(64), waits.motion.q.col(64));
   for (const int t : {0, 50, 149}) EXPECT_EQ(made.motion.q.col(65 + t), waits.motion.q.col(100 + t)) << t;
   EXPECT_EQ(made.motion.q.col(65 + 150 + 24), waits.motion.q.col(99));  // back where the act begins
   EXPECT_EQ(made.motion.q.col(65 + 175), waits.motion.q.col(100));      // and again
   EXPECT_EQ(made.phases.act_end, 300);
-  EXPECT_EQ(begun_at_once(ramp(), *test::g1()).motion.q, ramp().motion.q);  // never waits
+  EXPECT_EQ(begun_at_once(ramp()).motion.q, ramp().motion.q);  // never waits
 }
 
 TEST(MakeDemonstrations, BeforeAStillPartnerNobodyBeginsUntilHeHasLookedForFiveSeconds) {

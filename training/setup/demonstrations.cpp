@@ -64,7 +64,7 @@ Take take_of(const PairedMotion& clip, const RobotModel& robot, const Demonstrat
   take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, adaptation, seed);
   if (options.leads && gesture && (random.chance(0.5) || !partner_begins(clip.task, clip.partner.joints))) {
     take.waiting = std::make_shared<const PairedMotion>(with_waiting_partner(clip));
-    take.adapted = begun_at_once(take.adapted, robot);
+    take.adapted = begun_at_once(take.adapted);
   } else if (options.answers) {
     take.adapted.clip_frame += ahead(clip, take.adapted.motion, robot, random);
   }
@@ -230,7 +230,7 @@ PairedMotion with_waiting_partner(const PairedMotion& clip) {
   return waiting;
 }
 
-AdaptedMotion begun_at_once(const AdaptedMotion& waits, const RobotModel& robot) {
+AdaptedMotion begun_at_once(const AdaptedMotion& waits) {
   constexpr int kPause = 25, kReturn = 50;  // frames
   const RobotMotion& from = waits.motion;
   const int last = from.frames(), act = waits.phases.act_begin, until = std::min(last, waits.phases.act_end + kReturn);

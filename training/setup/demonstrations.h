@@ -66,7 +66,7 @@ AdaptedMotion put_off(const AdaptedMotion& meant, int frames);
 PairedMotion with_waiting_partner(const PairedMotion& clip);
 // The act of a motion that comes early and waits, done as soon as the robot is there and again until the end, half a
 // second apart. Its phases are those of all of them together.
-AdaptedMotion begun_at_once(const AdaptedMotion& waits, const RobotModel& robot);
+AdaptedMotion begun_at_once(const AdaptedMotion& waits);
 
 // "digest  clip_id" of every clip of a suite, with a first line that says which: the content of a test split.
 std::string split_text(const Suite& suite, int threads, Progress& progress);
