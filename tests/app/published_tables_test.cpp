@@ -68,7 +68,7 @@ TEST_P(PublishedTables, AreWhatTheRowsSay) {
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     EXPECT_TRUE(written.contains(entry.path().filename().string())) << entry.path();
 }
-INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables, testing::Values("policies", "sealed", "interaction"),
+INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables, testing::Values("policies", "sealed", "interaction", "real"),
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace
