@@ -1,8 +1,9 @@
-// duet controller import: an IO descriptor from what a network's makers say of it.
+// duet controller: an IO descriptor from what a network's makers say of it (import), and its audit.
 #include <fmt/format.h>
 
 #include <filesystem>
 
+#include "duet/app/cli/controller_audit.h"
 #include "duet/app/command.h"
 #include "duet/controllers/import/descriptor_import.h"
 #include "duet/core/file.h"
@@ -40,6 +41,7 @@ void run_import(Session& session, ImportRequest request, const std::string& outp
 void add_controller_import(CLI::App& app, Session& session) {
   CLI::App* controller = app.add_subcommand("controller", "one controller, from its makers' file to its descriptor");
   controller->require_subcommand(1);
+  add_controller_audit(*controller, session);
   CLI::App* command = add_command(
       *controller, session, "import",
       "write an IO descriptor from the metadata of an ONNX file (holosoma, BeyondMimic, mjlab) or from the YAML file "

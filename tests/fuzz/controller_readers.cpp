@@ -1,4 +1,8 @@
 // Files that controllers are made from: descriptors of networks' inputs and outputs, and the networks of WBC-Sim.
+#include <fmt/format.h>
+
+#include "duet/controllers/audit/trace.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/descriptor.h"
 #include "duet/controllers/import/descriptor_import.h"
 #include "duet/controllers/wbc_sim/observation.h"
@@ -52,6 +56,34 @@ void read_deployment(std::string_view bytes) {
   (void)import_descriptor({.file = scratch_file("deploy.yaml", bytes), .robot = "t1_12dof"});
 }
 
+const Descriptor& traced() {
+  static const Descriptor descriptor = load_descriptor("homie");
+  return descriptor;
+}
+
+const RobotModel& traced_robot() {
+  static const auto robot = load_shared_robot(card_path("g1_27dof"));
+  return *robot;
+}
+
+// Two rows of what HOMIE's program may have written down.
+std::string trace_sample(unsigned) {
+  std::string header =
+      "quat_w,quat_x,quat_y,quat_z,gyro_x,gyro_y,gyro_z,command_forward,command_lateral,command_yaw_rate";
+  std::string row = "1,0,0,0,0.1,0,-2e-3,0.5,0,0";
+  for (const char* stem : {"q", "v", "target"})
+    for (const DescriptorJoint& joint : traced().joints) {
+      if (std::string_view(stem) == "target" && !joint.action) continue;
+      header += fmt::format(",{}.{}", stem, joint.name);
+      row += ",0.25";
+    }
+  return header + "\n" + row + "\n" + row + "\n";
+}
+
+void read_trace(std::string_view bytes) {
+  (void)parse_controller_trace(std::string(bytes), "fuzz.csv", traced(), traced_robot());
+}
+
 SafeTensors small_network() {
   const int joints = robot().dof(), inputs = WbcLayout(joints).oracle();
   Random random(5, 6);
@@ -88,6 +120,7 @@ void read_wbc_network(std::string_view bytes) {
 
 std::vector<Reader> controller_readers() {
   return {{"controller_descriptor", descriptor_sample, read_descriptor},
+          {"controller_trace", trace_sample, read_trace},
           {"deployment", deployment_sample, read_deployment},
           {"wbc_network", wbc_sample, read_wbc_network}};
 }
