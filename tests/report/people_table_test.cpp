@@ -81,7 +81,7 @@ TEST(PeopleTable, DrawsOfAClipAreNoOtherClips) {
   for (int draw = 1; draw < 4; ++draw)
     for (std::size_t i = 0; i < one_draw; ++i) {
       EpisodeRow row = rows[i];
-      row.episode = draw;
+      row.episode += 10 * draw;
       row.key = episode_key(row);
       rows.push_back(row);
     }
