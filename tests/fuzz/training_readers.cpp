@@ -36,7 +36,8 @@ const SafeTensors& good_demonstrations() {
     const std::string path = scratch_folder() + "/demonstrations.safetensors";
     save_demonstrations(set, path);
     SafeTensors file = read_safetensors(path);
-    file.metadata["demonstrations"] = R"([{"clip":"x","digest":"d","task":"hug","act":[1,2],"leads":false,"frames":3}])";
+    file.metadata["demonstrations"] =
+        R"([{"clip":"x","digest":"d","task":"hug","act":[1,2],"leads":false,"frames":3}])";
     for (auto& [name, tensor] : file.tensors) {
       tensor.shape[0] = 3;
       tensor.values.resize(static_cast<std::size_t>(3 * tensor.shape[1]));
