@@ -187,7 +187,7 @@ struct McapScan {
     if (packing.empty()) return records(rest.subspan(head), 0, true);
     if (packing == "zstd") records(unpacked_start(rest.subspan(head)), 0, true);
   }
-  // What the beginning of a packed chunk unpacks to.
+  // The beginning of a packed chunk, unpacked.
   [[nodiscard]] std::vector<std::byte> unpacked_start(std::span<const std::byte> packed) const {
     constexpr std::size_t kStep = std::size_t{1} << 18;
     const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> stream(ZSTD_createDCtx(), &ZSTD_freeDCtx);

@@ -100,15 +100,19 @@ void add_level_3(const LoadedSubject& loaded, ControllerAudit& audit) {
   if (!equal.empty()) audit.defects = std::move(equal);
 }
 
+// "ok", "no", or "" where nothing was asked.
+const char* verdict_of(const AuditCheck& check) {
+  if (!check.good) return "no";
+  return check.asked.empty() ? "" : "ok";
+}
+
 TitledTable table_of(const ControllerAudit& audit, const std::string& name) {
   TitledTable titled{.title = fmt::format("Audit of {}", name)};
   titled.table.header = {"level", "check", "found", "asked", ""};
   titled.table.label_columns = 5;
   for (const AuditCheck& check : audit.checks)
-    titled.table.rows.push_back({fmt::format("L{}", check.level), check.what, check.found, check.asked,
-                                 check.asked.empty() && check.good ? ""
-                                 : check.good                      ? "ok"
-                                                                   : "no"});
+    titled.table.rows.push_back(
+        {fmt::format("L{}", check.level), check.what, check.found, check.asked, verdict_of(check)});
   return titled;
 }
 
@@ -124,11 +128,9 @@ std::vector<std::string> sentences_of(const ControllerAudit& audit, const Descri
 
 std::string text_of(const ControllerAudit& audit, const Descriptor& descriptor) {
   std::string text;
-  for (const AuditCheck& check : audit.checks) {
-    const char* verdict = check.good ? (check.asked.empty() ? "" : "ok") : "no";
-    text += fmt::format("  L{} {:<3} {:<32} {}{}\n", check.level, verdict, check.what, check.found,
+  for (const AuditCheck& check : audit.checks)
+    text += fmt::format("  L{} {:<3} {:<32} {}{}\n", check.level, verdict_of(check), check.what, check.found,
                         check.asked.empty() ? "" : fmt::format(" (asked: {})", check.asked));
-  }
   for (const std::string& line : sentences_of(audit, descriptor)) text += line + "\n";
   return text;
 }

@@ -404,7 +404,7 @@ class Readings {
           with_channel(g, c, [&](Channel& other) { other.scale = {most}; }));
   }
 
-  // Of a vector of one or two numbers: signs, and the two exchanged.
+  // A vector of one or two numbers: signs, and the two exchanged.
   void add_small_turns(std::size_t g, std::size_t c, ContractPart part, int size) {
     const Channel& channel = base_.observation.groups[g].channels[c];
     for (int bits = 1; bits < (1 << size); ++bits)

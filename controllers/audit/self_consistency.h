@@ -1,4 +1,4 @@
-// What a controller says of itself without physics: whether it treats left and right alike, how far its targets are
+// A controller asked about itself, without physics: whether it treats left and right alike, how far its targets are
 // from its default pose when it stands, how each joint answers a small step of its own.
 #pragma once
 
@@ -33,7 +33,7 @@ Descriptor with_mirrored_clocks(Descriptor descriptor);
 // about 1.4 where the two have nothing in common. Throws as `make`.
 double asymmetry(const Descriptor& descriptor, const RobotModel& robot, const ControllerOfReading& make);
 
-// Of a joint, by name, and how much.
+// A joint, by name, and how much.
 struct JointFigure {
   std::string joint;
   double value = 0.0;

@@ -206,7 +206,7 @@ double difference(double own, double other) {
   return std::isfinite(size) ? size : std::numeric_limits<double>::infinity();
 }
 
-// What makes a column of the trace of our own: the same numbers at another place, times a factor, with an offset.
+// How a column of the trace is made of our own: the same numbers at another place, times a factor, with an offset.
 std::string pattern_of(const Eigen::MatrixXd& own, const Eigen::MatrixXd& trace, Eigen::Index place,
                        const std::vector<std::string>& names) {
   const Eigen::VectorXd mine = own.col(place), theirs = trace.col(place);

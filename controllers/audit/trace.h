@@ -51,7 +51,8 @@ TraceAgreement compare_with_trace(const Descriptor& descriptor, const std::share
                                   const NetworkMaker& network, const std::string& network_path,
                                   const ControllerTrace& trace);
 
-// What the descriptor's controller shows its network on the trace's states and commands, as ControllerTrace has it.
+// The numbers that the descriptor's controller shows its network on the trace's states and commands, as ControllerTrace
+// has it.
 Eigen::MatrixXd observations_of_trace(const Descriptor& descriptor, const std::shared_ptr<const RobotModel>& robot,
                                       const NetworkMaker& network, const std::string& network_path,
                                       const ControllerTrace& trace);

@@ -40,7 +40,7 @@ struct HealthMessage {
   std::string next = {};            // what the operator may do now
 };
 
-// What the guard knows: all but distance, tracking, `late` and `left_out`. No allocation.
+// All that the guard knows but distance, tracking, `late` and `left_out`. No allocation.
 void fill_health(const RobotGuard& guard, GuardHealth& health);
 // `tick` comes after `window`, which keeps the oldest age, the nearest person and the hottest motor of both.
 void widen(const GuardHealth& tick, GuardHealth& window);

@@ -18,7 +18,7 @@ class LimiterReplay {
 
   // Whether the limiter makes of the tick what the log has, to the bit.
   bool agrees(const TickRecord& record);
-  // Of the last tick.
+  // The last tick's.
   [[nodiscard]] const ClampCounts& clamps() const { return clamps_; }
   [[nodiscard]] const Limiter& limiter() const { return limiter_; }
 

@@ -20,7 +20,7 @@ struct LogEvent {
   std::string text;   // as it stands in the log
 };
 
-// What is done with each kind of message; those without a function are passed over. A tick comes before the frames of
+// A function for each kind of message; those without a function are passed over. A tick comes before the frames of
 // its state and command, and before its event.
 struct LogParts {
   std::function<void(const LimiterSetup& setup, const nlohmann::json& json)> setup = {};

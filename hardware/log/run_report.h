@@ -1,4 +1,4 @@
-// What a debriefing asks of a run's log: states and why they changed, faults, what the limiter changed and where, how
+// A run's log for a debriefing: states and why they changed, faults, what the limiter changed and where, how
 // near the person came, ages, heat, rates, and how well joints followed.
 #pragma once
 

@@ -53,7 +53,7 @@ class TrialGround {
   std::unique_ptr<Backend> backend_;
 };
 
-// What a trial costs: 1 and the share of the time that was lost where it fell, else a number below 1 of the errors of
+// The cost of a trial: 1 and the share of the time that was lost where it fell, else a number below 1 of the errors of
 // its velocity, its lean, its jerk.
 double trial_cost(const TrialTask& task, const TrialResult& result);
 

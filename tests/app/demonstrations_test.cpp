@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "duet/metrics/detector.h"
@@ -118,6 +119,19 @@ TEST(MakeDemonstrations, ForTheRealRobotAreThoseOfAlgorithm7) {
 // The first frame in which somebody's hand is a fifth of an arm over its lowest place so far and stays there.
 std::optional<int> begins(const Agent& agent) { return act_onset(ActOnset::kHandRises, agent); }
 
+// The meant motion and the partner's joints of one demonstration.
+std::pair<RobotMotion, PointTracks> tracks_of(const DemonstrationSet& set, const Demonstration& entry) {
+  RobotMotion robot{kTickRate, test::g1()->joint_names(), {}, Eigen::MatrixXd(test::g1()->dof(), entry.frames)};
+  PointTracks partner(entry.frames, kSmplJoints);
+  for (int t = 0; t < entry.frames; ++t) {
+    const Reference meant = set.reference(entry.begin + t);
+    robot.root.push_back(meant.X_WB);
+    robot.q.col(t) = meant.q;
+    partner.frame(t) = set.partner.col(entry.begin + t).cast<double>().reshaped(3, kSmplJoints);
+  }
+  return {std::move(robot), std::move(partner)};
+}
+
 TEST(MakeDemonstrations, InAnswerTheRobotBeginsAfterItsPartner) {
   DemonstrationOptions options = small_options();
   options.engine = "";
@@ -128,14 +142,7 @@ TEST(MakeDemonstrations, InAnswerTheRobotBeginsAfterItsPartner) {
   int both = 0;
   for (const Demonstration& entry : set.list) {
     if (entry.task != Task::kHandshake && entry.task != Task::kHighFive && entry.task != Task::kWave) continue;
-    RobotMotion robot{kTickRate, test::g1()->joint_names(), {}, Eigen::MatrixXd(test::g1()->dof(), entry.frames)};
-    PointTracks partner(entry.frames, kSmplJoints);
-    for (int t = 0; t < entry.frames; ++t) {
-      const Reference meant = set.reference(entry.begin + t);
-      robot.root.push_back(meant.X_WB);
-      robot.q.col(t) = meant.q;
-      partner.frame(t) = set.partner.col(entry.begin + t).cast<double>().reshaped(3, kSmplJoints);
-    }
+    const auto [robot, partner] = tracks_of(set, entry);
     const std::optional<int> own = begins(robot_agent(*test::g1(), robot)), other = begins(human_agent(partner));
     if (!own || !other) continue;
     ++both;
@@ -159,14 +166,7 @@ TEST(MakeDemonstrations, WhereItLeadsThePartnerWaitsOnAndTheRobotActsAtOnceAndAg
     if (!entry.leads) continue;
     EXPECT_TRUE(gesture) << entry.clip_id;
     ++leads;
-    PointTracks partner(entry.frames, kSmplJoints);
-    RobotMotion robot{kTickRate, test::g1()->joint_names(), {}, Eigen::MatrixXd(test::g1()->dof(), entry.frames)};
-    for (int t = 0; t < entry.frames; ++t) {
-      const Reference meant = set.reference(entry.begin + t);
-      robot.root.push_back(meant.X_WB);
-      robot.q.col(t) = meant.q;
-      partner.frame(t) = set.partner.col(entry.begin + t).cast<double>().reshaped(3, kSmplJoints);
-    }
+    const auto [robot, partner] = tracks_of(set, entry);
     EXPECT_TRUE(!partner_begins(entry.task, partner)) << entry.clip_id;
     EXPECT_LE((robot.root[entry.phases.act_begin].p - robot.root[entry.phases.act_begin - 20].p).norm(), 1e-6);
     for (int t = 1; t < entry.frames; ++t)

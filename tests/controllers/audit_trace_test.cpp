@@ -27,7 +27,7 @@ class MixingNetwork final : public Network {
   std::vector<Port> inputs_, outputs_;
 };
 
-// What the program of rl_gym's makers would have written down, of six acts.
+// Six acts as the program of rl_gym's makers would have written them down.
 struct RecordedTrace {
   RecordedTrace() : descriptor(load_descriptor("rl_gym")), robot(test::body(descriptor.robot)) {
     const int in = descriptor.input_size(descriptor.observation.inputs[0]);

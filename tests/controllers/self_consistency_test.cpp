@@ -1,4 +1,4 @@
-// What a controller says of itself without physics, over networks whose answers are known; and readings of descriptors.
+// A controller asked about itself, without physics, over networks whose answers are known; and readings of descriptors.
 #include "duet/controllers/audit/self_consistency.h"
 
 #include <gmock/gmock.h>
@@ -83,7 +83,7 @@ TEST(SelfConsistency, TheFirstTargetIsMeasuredFromTheDefaultPose) {
   EXPECT_NEAR(most.value, 0.25 * 2.0, 1e-4);
 }
 
-// What a descriptor says of the network, in words that two descriptors can be compared by.
+// A descriptor's contract in words that two descriptors can be compared by.
 std::string words_of(const Descriptor& descriptor) {
   std::string words = fmt::format("{} {} {}", descriptor.rate_hz, descriptor.action_clip, descriptor.within_limits);
   for (const DescriptorJoint& joint : descriptor.joints)

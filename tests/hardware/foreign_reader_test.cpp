@@ -3,24 +3,19 @@
 #include <gmock/gmock.h>
 
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <thread>
 #include <vector>
 
 #include "duet/core/file.h"
-#include "duet/hardware/log/run_log.h"
-#include "tests/hardware/guarded_twin.h"
+#include "tests/hardware/logged_twin.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
-
-using test::GuardedTwin;
 
 constexpr const char* kViewer = DUET_SOURCE_DIR "/viewer";
 
@@ -43,29 +38,16 @@ Row row_of(double now, double kind, const Frame& frame) {
 // A run of 6 s with arms that move; what was read and sent.
 std::vector<Row> run_and_log(const std::string& path) {
   std::vector<Row> rows;
-  GuardedTwin robot(test::twin_guard(), {.place_noise = 0.001, .joint_noise = 1e-3});
-  RunLog log(path, test::twin_guard());
-  const auto run_for = [&](double seconds) {
-    for (double left = seconds; left > 0.5 * GuardedTwin::kDt; left -= GuardedTwin::kDt) {
-      robot.tick();
-      log.add(robot.guard);
-      const GuardStatus& status = robot.guard.status();
-      rows.push_back(row_of(status.input.now, 0.0, status.state_frame));
-      if (status.sent) rows.push_back(row_of(status.input.now, 1.0, status.frame));
-      if (robot.ticks % 500 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(30));  // the writer's turn
-    }
+  test::LoggedTwin run(path, test::twin_guard(), {.place_noise = 0.001, .joint_noise = 1e-3});
+  const auto remember = [&] {
+    const GuardStatus& status = run.robot.guard.status();
+    rows.push_back(row_of(status.input.now, 0.0, status.state_frame));
+    if (status.sent) rows.push_back(row_of(status.input.now, 1.0, status.frame));
   };
-  robot.hold_key(RemoteKey::kR1);
-  run_for(2.2);
-  robot.guard.arm();
-  run_for(0.01);
-  robot.hold_key(RemoteKey::kStart);
-  run_for(0.1);
-  robot.drop_key(RemoteKey::kStart);
-  robot.hold_key(RemoteKey::kA);
-  robot.message.command.q.array() += 0.5;
-  run_for(4.0);
-  EXPECT_EQ(log.dropped(), 0);
+  run.arm(remember);
+  run.robot.message.command.q.array() += 0.5;
+  run.run_for(4.0, remember);
+  EXPECT_EQ(run.log.dropped(), 0);
   return rows;
 }
 

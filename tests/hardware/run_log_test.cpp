@@ -15,7 +15,7 @@
 #include "duet/hardware/log/frame_cdr.h"
 #include "duet/hardware/log/limiter_replay.h"
 #include "tests/backends/allocation_count.h"
-#include "tests/hardware/guarded_twin.h"
+#include "tests/hardware/logged_twin.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -38,34 +38,20 @@ std::string small_file(const test::ScratchFolder& folder) {
 
 // A run with arms, walking, a planner that comes back and the operator's stop.
 void run_and_log(const std::string& path, const GuardSetup& setup) {
-  GuardedTwin robot(setup, {.place_noise = 0.001, .joint_noise = 1e-4});
-  RunLog log(path, setup);
-  const auto run_for = [&](double seconds) {
-    for (double left = seconds; left > 0.5 * GuardedTwin::kDt; left -= GuardedTwin::kDt) {
-      robot.tick();
-      log.add(robot.guard);
-      if (robot.ticks % 500 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(30));  // the writer's turn
-    }
-  };
-  robot.hold_key(RemoteKey::kR1);
-  run_for(2.2);
-  robot.guard.arm();
-  run_for(0.01);
-  robot.hold_key(RemoteKey::kStart);
-  run_for(0.1);
-  robot.drop_key(RemoteKey::kStart);
-  robot.hold_key(RemoteKey::kA);
+  test::LoggedTwin run(path, setup, {.place_noise = 0.001, .joint_noise = 1e-4});
+  GuardedTwin& robot = run.robot;
+  run.arm();
   robot.message.command.root.forward = 0.3;
   robot.message.command.q.array() += 0.5;
-  run_for(2.0);
+  run.run_for(2.0);
   robot.plans = false;
-  run_for(0.8);
+  run.run_for(0.8);
   robot.plans = true;
-  run_for(0.3);
+  run.run_for(0.3);
   robot.hold_key(RemoteKey::kSelect);
-  run_for(0.2);
-  EXPECT_EQ(log.dropped(), 0);
-  EXPECT_TRUE(log.good());
+  run.run_for(0.2);
+  EXPECT_EQ(run.log.dropped(), 0);
+  EXPECT_TRUE(run.log.good());
 }
 
 void expect_same_bits(const GuardSetup& setup) {
@@ -322,7 +308,7 @@ TEST(RunLog, ALogThatIsCutAnywhereIsReplayedAsFarAsItGoes) {
   EXPECT_GT(before, 2000);
 }
 
-// What a guard that is killed now would leave: all but the ticks that the writer has not come to.
+// The file that a guard that is killed now would leave: all but the ticks that the writer has not come to.
 TEST(RunLog, ALogInWorkHasEveryTickThatWasWritten) {
   const test::ScratchFolder folder;
   GuardedTwin robot;

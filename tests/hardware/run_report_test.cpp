@@ -2,55 +2,32 @@
 
 #include <gmock/gmock.h>
 
-#include <chrono>
 #include <cmath>
-#include <thread>
 
 #include "duet/archives/mcap.h"
 #include "duet/core/require.h"
-#include "duet/hardware/log/run_log.h"
-#include "tests/hardware/guarded_twin.h"
+#include "tests/hardware/logged_twin.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
 using test::GuardedTwin;
+using test::LoggedTwin;
 using ::testing::ElementsAre;
 
-// A guarded twin whose every tick is logged.
-struct LoggedTwin {
-  explicit LoggedTwin(const std::string& path, const GuardSetup& setup = test::twin_guard())
-      : robot(setup), log(path, setup) {}
-  void run_for(double seconds) {
-    for (double left = seconds; left > 0.5 * GuardedTwin::kDt; left -= GuardedTwin::kDt) {
-      robot.tick();
-      log.add(robot.guard);
-      if (robot.ticks % 500 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(30));  // the writer's turn
-    }
-  }
-  void start() {
-    robot.hold_key(RemoteKey::kR1);
-    run_for(2.2);
-    robot.guard.arm();
-    run_for(0.01);
-    robot.hold_key(RemoteKey::kStart);
-    run_for(0.1);
-    robot.drop_key(RemoteKey::kStart);
-    robot.hold_key(RemoteKey::kA);
-    run_for(1.0);
-    robot.drop_key(RemoteKey::kA);
-  }
-
-  GuardedTwin robot;
-  RunLog log;
-};
+// Armed, started, and run for a second.
+void start(LoggedTwin& run) {
+  run.arm();
+  run.run_for(1.0);
+  run.robot.drop_key(RemoteKey::kA);
+}
 
 TEST(RunReport, HasStatesAndWhyTheyChangedAndForHowLong) {
   const test::ScratchFolder folder;
   {
     LoggedTwin run(folder / "run.mcap");
-    run.start();
+    start(run);
     run.robot.plans = false;
     run.run_for(0.8);
     run.robot.hold_key(RemoteKey::kSelect);
@@ -83,7 +60,7 @@ TEST(RunReport, SaysWhichJointTheLimiterChangedAndWhy) {
   const int elbow = test::g1()->roles.arms[0][3];
   {
     LoggedTwin run(folder / "run.mcap");
-    run.start();
+    start(run);
     run.robot.message.command.q[elbow] += 0.6;
     run.run_for(1.0);
   }

@@ -37,7 +37,7 @@ bool is_asked_for(const std::string& name, const std::vector<std::string>& only)
   return only.empty() || std::ranges::find(only, name) != only.end();
 }
 
-// What is named first, or "nothing".
+// The part that is named first, or "nothing".
 std::string first_of(const ControllerAudit& audit) {
   if (audit.defects.empty()) return "nothing";
   return fmt::format("{}: {}", to_string(audit.defects[0].part), audit.defects[0].said);

@@ -40,6 +40,8 @@ struct Take {
   AdaptedMotion adapted;
   PointTracks partner;
   std::vector<RobotState> followed;  // in the engine, while it was upright
+
+  [[nodiscard]] const PairedMotion& seen() const { return waiting ? *waiting : *clip; }
 };
 
 // Frames by which the partner has to be ahead of the clip for the robot to begin a reaction after him. Nobody answers a
@@ -68,8 +70,8 @@ Take take_of(const PairedMotion& clip, const RobotModel& robot, const Demonstrat
   } else if (options.answers) {
     take.adapted.clip_frame += ahead(clip, take.adapted.motion, robot, random);
   }
-  take.partner = partner_motion(take.waiting ? take.waiting->partner : clip.partner, std::nullopt, take.adapted.phases,
-                                take.adapted.clip_frame, take.adapted.motion.frames())
+  take.partner = partner_motion(take.seen().partner, std::nullopt, take.adapted.phases, take.adapted.clip_frame,
+                                take.adapted.motion.frames())
                      .joints;
   return take;
 }
@@ -91,7 +93,7 @@ void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const De
             const PolicyMaker& make_policy, const LoadedController& make_controller) {
   const std::unique_ptr<Policy> policy = make_policy();
   RolloutSetup setup;
-  setup.clip = take.waiting ? take.waiting.get() : take.clip;
+  setup.clip = &take.seen();
   setup.reference = take.adapted;
   setup.start = robot->standing_state(take.adapted.motion.root.front());
   setup.fall = robot->fall;
