@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <future>
 #include <numbers>
 
 #include "duet/core/require.h"
 #include "duet/nn/dense_kernels.h"
 #include "duet/training/agent.h"
 #include "duet/training/dstar/torch/blas.h"
+#include "duet/training/dstar/torch/device_network.h"
 #include "duet/training/dstar/torch/losses.h"
 #include "duet/training/dstar/torch/model.h"
 #include "duet/training/dstar/trainer.h"
@@ -55,11 +57,14 @@ ModelInput on_device(const ModelInput& input, torch::Device device) {
           input.distance.to(device), input.orientation.to(device), input.language.to(device)};
 }
 
-// Copies that gather gradients.
-Weights leaves_on(const Weights& weights, torch::Device device) {
-  Weights leaves;
-  for (const auto& [name, tensor] : weights) leaves[name] = tensor.to(device).requires_grad_(true);
-  return leaves;
+ModelInput joined(const std::vector<ModelInput>& parts) {
+  const auto all = [&](Tensor ModelInput::*member) {
+    std::vector<Tensor> tensors;
+    for (const ModelInput& part : parts) tensors.push_back(part.*member);
+    return torch::cat(tensors);
+  };
+  return {all(&ModelInput::frames),   all(&ModelInput::past),        all(&ModelInput::position),
+          all(&ModelInput::distance), all(&ModelInput::orientation), all(&ModelInput::language)};
 }
 
 class Trainer {
@@ -68,11 +73,8 @@ class Trainer {
       : data_(data),
         run_(run),
         device_(device_of(run.device)),
-        weights_(run.config),
-        average_(run.config),
-        m_(weights_.size(), 0.0F),
-        v_(weights_.size(), 0.0F),
-        gradient_(weights_.size(), 0.0F),
+        state_(run.config),
+        gradient_(state_.weights.size(), 0.0F),
         alpha_bar_(squared_cosine_alpha_bar(run.config.training_steps)),
         windows_(list_windows(*data.train, windows_of(run))),
         validation_windows_(list_windows(*data.validation, windows_of(run))) {
@@ -83,27 +85,28 @@ class Trainer {
     one_thread_each();
     WindowMaker maker(data.robot, *data.train, windows_of(run));
     statistics_ = window_statistics(maker, windows_, run.seed);
-    weights_.initialise(run.seed);
+    state_.weights.initialise(run.seed);
     if (run.from) begin_with(*run.from);
     units_ = std::make_unique<Units>(statistics_, *data.language, leads());
     for (int i = 0; i < run.threads; ++i) lanes_.push_back(std::make_unique<Lane>(data, run));
-    std::copy(weights_.data(), weights_.data() + weights_.size(), average_.data());
+    std::copy_n(state_.weights.data(), state_.weights.size(), state_.average.data());
     fill_validation();
+    to_device();
   }
 
-  // One step of Adam; the same step number gives the same numbers.
+  // One step of Adam; the same step number gives the same numbers on a CPU.
   LossParts step() {
-    on_threads(run_.threads, [&](int lane) { work(*lanes_[lane], lane); });
+    if (network_)
+      learn_on_device();
+    else
+      learn_on_threads();
     LossParts parts;
-    for (int lane = 0; lane < run_.threads; ++lane) {
-      const float* g = lanes_[lane]->gradient.data();
-      for (int i = 0; i < weights_.size(); ++i) gradient_[i] = lane == 0 ? g[i] : gradient_[i] + g[i];
-      parts.total += lanes_[lane]->parts.total / run_.threads;
-      parts.action += lanes_[lane]->parts.action / run_.threads;
-      parts.phase += lanes_[lane]->parts.phase / run_.threads;
-      parts.auxiliary += lanes_[lane]->parts.auxiliary / run_.threads;
+    for (const auto& lane : lanes_) {
+      parts.total += lane->parts.total / run_.threads;
+      parts.action += lane->parts.action / run_.threads;
+      parts.phase += lane->parts.phase / run_.threads;
+      parts.auxiliary += lane->parts.auxiliary / run_.threads;
     }
-    apply();
     ++step_;
     return parts;
   }
@@ -111,23 +114,24 @@ class Trainer {
   // Action loss of sampled plans and the share of phases told right, with the averaged weights.
   std::pair<double, double> validate() {
     const torch::NoGradGuard guard;
-    const Weights weights = average_.views(false);
-    const ModelCondition encoded = encode(run_.config, weights, units_->input(validation_));
-    const Tensor plan = sample(run_.config, weights, validation_noise_, encoded.condition);
+    const Weights weights = network_ ? network_->average() : state_.average.views(false);
+    const ModelCondition encoded = encode(run_.config, weights, on_device(units_->input(validation_), device_));
+    const Tensor plan = sample(run_.config, weights, validation_noise_.to(device_), encoded.condition).cpu();
     const Tensor wanted = view(validation_.plan, {validation_.size, kAnchors, kAnchorSize});
     const double loss = action_loss(run_.loss, units_->physical(plan), wanted).item<double>();
     if (!encoded.phase_logits.defined()) return {loss, 0.0};
-    const Tensor right = encoded.phase_logits.argmax(1) == tensor_of_ints(validation_.phase);
+    const Tensor right = encoded.phase_logits.cpu().argmax(1) == tensor_of_ints(validation_.phase);
     return {loss, right.to(torch::kFloat32).mean().item<double>()};
   }
 
-  [[nodiscard]] DstarNetwork network() const {
+  [[nodiscard]] DstarNetwork network() {
+    if (network_) network_->read(state_);
     DstarNetwork network;
     network.config = run_.config;
     network.robot = data_.robot->name;
     network.joints = data_.robot->joint_names();
     network.channels = channel_names(*data_.robot);
-    network.weights = average_.tensors();
+    network.weights = state_.average.tensors();
     network.frame_mean = statistics_.frame_mean;
     network.frame_deviation = statistics_.frame_deviation;
     network.plan_mean = statistics_.plan_mean;
@@ -157,20 +161,27 @@ class Trainer {
   int stale = 0;  // validations since the best one
 
  private:
+  // What one thread works on: its share of each batch.
   struct Lane {
     Lane(const DstarData& data, const DstarRun& run)
         : weights(run.config),
           maker(data.robot, *data.train, windows_of(run)),
           gradient(weights.size(), 0.0F),
           leaves(weights.views(true)) {
-      windows.resize(run.batch / run.threads);
-      later.resize(std::max(1, static_cast<int>(kTransitionShare * windows.size)));
+      for (Drawn* drawn : {&now, &next}) {
+        drawn->windows.resize(run.batch / run.threads);
+        drawn->later.resize(std::max(1, static_cast<int>(kTransitionShare * drawn->windows.size)));
+      }
     }
+    struct Drawn {
+      WindowBatch windows, later;  // later: the first ones half a second on
+      Tensor step, x;              // of the noise, and the plans under it
+    };
     WeightBlock weights;
     WindowMaker maker;
     std::vector<float> gradient;
     Weights leaves;
-    WindowBatch windows, later;  // later: the first ones half a second on
+    Drawn now, next;
     LossParts parts;
   };
 
@@ -185,7 +196,7 @@ class Trainer {
     require(network.language == data_.language->name(),
             "training D-STAR: the network to begin with learnt from the language encoder '{}', this is '{}'",
             network.language, data_.language->name());
-    weights_.assign(network.weights);
+    state_.weights.assign(network.weights);
     statistics_ = {network.frame_mean, network.frame_deviation, network.plan_mean, network.plan_deviation};
   }
 
@@ -207,40 +218,115 @@ class Trainer {
     validation_noise_ = normal_noise({kValidationWindows, kAnchors, kAnchorSize}, random);
   }
 
-  void fill(Lane& lane, Random& random) {
-    WindowBatch& now = lane.windows;
-    WindowBatch& later = lane.later;
+  void to_device() {
+    network_.reset();
+    drawn_ = -1;
+    if (device_.is_cpu()) return;
+    at::globalContext().setDeterministicCuDNN(true);
+    network_ = std::make_unique<DeviceNetwork>(state_, device_);
+  }
+
+  // The windows of that step and the noise on their plans: a thread's share.
+  void draw(Lane& lane, Lane::Drawn& drawn, long step, int number) {
+    Random random(run_.seed, stream_key({"dstar step", std::to_string(step), std::to_string(number)}));
+    WindowBatch& now = drawn.windows;
     for (int i = 0; i < now.size; ++i) {
       Window window = windows_[random.below(static_cast<int>(windows_.size()))];
       lane.maker.make(window, random, now, i);
-      if (i >= later.size) continue;
+      if (i >= drawn.later.size) continue;
       const int last = data_.train->list[window.demonstration].frames - 1;
       window.frame = std::min(last, window.frame + kTransitionTicks);
-      lane.maker.make(window, random, later, i);
+      lane.maker.make(window, random, drawn.later, i);
     }
+    drawn.step = torch::empty({now.size}, torch::kInt64);
+    for (int i = 0; i < now.size; ++i)
+      drawn.step.data_ptr<std::int64_t>()[i] = random.below(run_.config.training_steps);
+    drawn.x = noised(units_->normalised(wanted_of(now)), drawn.step, alpha_bar_, random);
   }
 
-  void work(Lane& lane, int number) {
-    Random random(run_.seed, stream_key({"dstar step", std::to_string(step_), std::to_string(number)}));
-    fill(lane, random);
-    std::copy(weights_.data(), weights_.data() + weights_.size(), lane.weights.data());
-    if (!device_.is_cpu()) lane.leaves = leaves_on(lane.weights.views(false), device_);
-    WindowBatch& batch = lane.windows;
-    const ModelCondition encoded = encode(run_.config, lane.leaves, on_device(units_->input(batch), device_));
-    const Tensor wanted = view(batch.plan, {batch.size, kAnchors, kAnchorSize});
-    Tensor step = torch::empty({batch.size}, torch::kInt64);
-    for (int i = 0; i < batch.size; ++i) step.data_ptr<std::int64_t>()[i] = random.below(run_.config.training_steps);
-    const Tensor x = noised(units_->normalised(wanted), step, alpha_bar_, random);
-    const Tensor clean = denoise(run_.config, lane.leaves, x.to(device_), step.to(device_), encoded.condition);
-    const Tensor plan = units_->physical(clean.cpu());
-    const Tensor loss = total_loss(lane, plan, wanted, encoded);
-    (loss / run_.threads).backward();
+  static Tensor wanted_of(WindowBatch& batch) { return view(batch.plan, {batch.size, kAnchors, kAnchorSize}); }
+
+  void learn_on_threads() {
+    on_threads(run_.threads, [&](int lane) { learn(*lanes_[lane], lane); });
+    for (int lane = 0; lane < run_.threads; ++lane) {
+      const float* g = lanes_[lane]->gradient.data();
+      for (std::size_t i = 0; i < gradient_.size(); ++i) gradient_[i] = lane == 0 ? g[i] : gradient_[i] + g[i];
+    }
+    apply();
+  }
+
+  void learn(Lane& lane, int number) {
+    draw(lane, lane.now, step_, number);
+    std::copy_n(state_.weights.data(), state_.weights.size(), lane.weights.data());
+    const ModelCondition encoded = encode(run_.config, lane.leaves, units_->input(lane.now.windows));
+    const Tensor clean = denoise(run_.config, lane.leaves, lane.now.x, lane.now.step, encoded.condition);
+    const Tensor next = later_logits(lane.leaves, encoded, [&] { return units_->input(lane.now.later); });
+    (total_loss(lane, clean, encoded.phase_logits, next) / run_.threads).backward();
     collect(lane);
   }
 
-  Tensor total_loss(Lane& lane, const Tensor& plan, const Tensor& wanted, const ModelCondition& encoded) {
-    WindowBatch& batch = lane.windows;
+  // One network sees the whole batch; windows and losses are made on the CPU's threads, windows of the next step while
+  // the network learns.
+  void learn_on_device() {
+    const auto draw_all = [this](Lane::Drawn Lane::*drawn, long step) {
+      on_threads(run_.threads, [&](int lane) { draw(*lanes_[lane], (*lanes_[lane]).*drawn, step, lane); });
+    };
+    if (drawn_ != step_) draw_all(&Lane::now, step_);
+    std::future<void> drawing = std::async(std::launch::async, draw_all, &Lane::next, step_ + 1);
+    const auto input = [&](WindowBatch Lane::Drawn::*batch) {
+      std::vector<ModelInput> parts;
+      for (const auto& lane : lanes_) parts.push_back(units_->input(lane->now.*batch));
+      return on_device(joined(parts), device_);
+    };
+    const auto all = [&](Tensor Lane::Drawn::*part) {
+      std::vector<Tensor> parts;
+      for (const auto& lane : lanes_) parts.push_back(lane->now.*part);
+      return torch::cat(parts).to(device_);
+    };
+    const Weights& leaves = network_->leaves();
+    const ModelCondition encoded = encode(run_.config, leaves, input(&Lane::Drawn::windows));
+    const Tensor clean = denoise(run_.config, leaves, all(&Lane::Drawn::x), all(&Lane::Drawn::step), encoded.condition);
+    const Tensor next = later_logits(leaves, encoded, [&] { return input(&Lane::Drawn::later); });
+    pull_back({clean, encoded.phase_logits, next});
+    network_->apply({step_, rate(), run_.average});
+    drawing.get();
+    for (const auto& lane : lanes_) std::swap(lane->now, lane->next);
+    drawn_ = step_ + 1;
+  }
+
+  // The loss on the CPU's threads, then its gradient through the network.
+  void pull_back(std::vector<Tensor> outputs) {
+    std::erase_if(outputs, [](const Tensor& output) { return !output.defined(); });
+    std::vector<Tensor> host, gradients(outputs.size());
+    for (const Tensor& output : outputs) host.push_back(output.detach().cpu());
+    std::vector<std::vector<Tensor>> shares(lanes_.size());
+    on_threads(run_.threads, [&](int number) {
+      for (const Tensor& output : host)
+        shares[number].push_back(output.chunk(run_.threads)[number].clone().requires_grad_(true));
+      const std::vector<Tensor>& share = shares[number];
+      const auto at = [&](std::size_t i) { return i < share.size() ? share[i] : Tensor(); };
+      (total_loss(*lanes_[number], at(0), at(1), at(2)) / run_.threads).backward();
+    });
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      std::vector<Tensor> parts;
+      for (const std::vector<Tensor>& share : shares)
+        parts.push_back(share[i].grad().defined() ? share[i].grad() : torch::zeros_like(share[i]));
+      gradients[i] = torch::cat(parts).to(device_);
+    }
+    torch::autograd::backward(outputs, gradients);
+  }
+
+  // Phases half a second on; undefined where no loss asks for them.
+  template <typename Input>
+  Tensor later_logits(const Weights& weights, const ModelCondition& encoded, const Input& input) const {
+    if (run_.loss.lambda_phase <= 0.0 || !encoded.phase_logits.defined()) return {};
+    return classify(run_.config, weights, input());
+  }
+
+  Tensor total_loss(Lane& lane, const Tensor& clean, const Tensor& phase_logits, const Tensor& next) {
+    WindowBatch& batch = lane.now.windows;
     const DstarLoss& w = run_.loss;
+    const Tensor plan = units_->physical(clean), wanted = wanted_of(batch);
     Tensor loss = action_loss(w, plan, wanted);
     lane.parts.action = loss.item<double>();
     if (w.lambda_auxiliary > 0.0) {
@@ -251,9 +337,8 @@ class Trainer {
       lane.parts.auxiliary = auxiliary.item<double>();
       loss = loss + w.lambda_auxiliary * auxiliary;
     }
-    if (w.lambda_phase > 0.0 && encoded.phase_logits.defined()) {
-      const Tensor next = classify(run_.config, lane.leaves, on_device(units_->input(lane.later), device_)).cpu();
-      const Tensor phase = phase_loss(w, encoded.phase_logits.cpu(), tensor_of_ints(batch.phase), next);
+    if (next.defined()) {
+      const Tensor phase = phase_loss(w, phase_logits, tensor_of_ints(batch.phase), next);
       lane.parts.phase = phase.item<double>();
       loss = loss + w.lambda_phase * phase;
     }
@@ -277,25 +362,26 @@ class Trainer {
     }
   }
 
-  // Adam with the gradient's norm bounded, then the running average.
   void apply() {
-    const Eigen::Map<const Eigen::VectorXf> g(gradient_.data(), weights_.size());
+    const int n = state_.weights.size();
+    const Eigen::Map<const Eigen::VectorXf> g(gradient_.data(), n);
     const float norm = g.norm();
-    const float scale = norm > 5.0F ? 5.0F / norm : 1.0F;
-    const double t = static_cast<double>(step_ + 1);
-    dense_kernels().adam(weights_.size(), gradient_.data(), scale,
-                         static_cast<float>(rate() / (1.0 - std::pow(0.9, t))),
-                         static_cast<float>(1.0 - std::pow(0.999, t)), m_.data(), v_.data(), weights_.data());
-    const auto keep = static_cast<float>(std::min(run_.average, (1.0 + t) / (10.0 + t)));
-    Eigen::Map<Eigen::VectorXf> average(average_.data(), average_.size());
-    average = keep * average + (1.0F - keep) * Eigen::Map<const Eigen::VectorXf>(weights_.data(), weights_.size());
+    const float scale = norm > AdamStep::kNorm ? AdamStep::kNorm / norm : 1.0F;
+    const AdamStep step{step_, rate(), run_.average};
+    dense_kernels().adam(n, gradient_.data(), scale, static_cast<float>(step.corrected_rate()),
+                         static_cast<float>(step.correction()), state_.m.data(), state_.v.data(),
+                         state_.weights.data());
+    const auto keep = static_cast<float>(step.kept());
+    Eigen::Map<Eigen::VectorXf> average(state_.average.data(), n);
+    average = keep * average + (1.0F - keep) * Eigen::Map<const Eigen::VectorXf>(state_.weights.data(), n);
   }
 
   DstarData data_;
   DstarRun run_;
   torch::Device device_;  // of the networks while they learn
-  WeightBlock weights_, average_;
-  std::vector<float> m_, v_, gradient_;
+  LearningState state_;   // behind that of `network_` where there is one
+  std::unique_ptr<DeviceNetwork> network_;
+  std::vector<float> gradient_;
   std::vector<double> alpha_bar_;
   std::vector<Window> windows_, validation_windows_;
   WindowStatistics statistics_;
@@ -303,10 +389,11 @@ class Trainer {
   std::vector<std::unique_ptr<Lane>> lanes_;
   WindowBatch validation_;
   Tensor validation_noise_;
-  long step_ = 0;
+  long step_ = 0, drawn_ = -1;  // the step of which the lanes hold windows
 };
 
 void Trainer::save(double minutes) {
+  if (network_) network_->read(state_);
   SafeTensors file;
   file.metadata = {{"format", kFormat},
                    {"robot_digest", data_.robot->digest},
@@ -318,10 +405,14 @@ void Trainer::save(double minutes) {
                    {"until", std::to_string(run_.until)},
                    {"stale", std::to_string(stale)}};
   for (const auto& [name, values] : normalisers()) file.tensors[name] = tensor_of(*values);
-  file.tensors["weights"] = tensor_of(Eigen::Map<const Eigen::VectorXf>(weights_.data(), weights_.size()));
-  file.tensors["average"] = tensor_of(Eigen::Map<const Eigen::VectorXf>(average_.data(), average_.size()));
-  file.tensors["adam.m"] = tensor_of(Eigen::Map<const Eigen::VectorXf>(m_.data(), weights_.size()));
-  file.tensors["adam.v"] = tensor_of(Eigen::Map<const Eigen::VectorXf>(v_.data(), weights_.size()));
+  const int n = state_.weights.size();
+  const auto add = [&](const char* name, const float* values) {
+    file.tensors[name] = tensor_of(Eigen::Map<const Eigen::VectorXf>(values, n));
+  };
+  add("weights", state_.weights.data());
+  add("average", state_.average.data());
+  add("adam.m", state_.m.data());
+  add("adam.v", state_.v.data());
   write_safetensors(dstar_checkpoint(run_), file);
 }
 
@@ -340,15 +431,16 @@ double Trainer::restore() {
   expect(path, "configuration", to_json_text(run_.config), text_of(file, "config", path));
   expect(path, "seed", std::to_string(run_.seed), text_of(file, "seed", path));
   const auto load = [&](const char* name, float* out) {
-    const Eigen::VectorXf values = vector_of(file, name, weights_.size(), path);
+    const Eigen::VectorXf values = vector_of(file, name, state_.weights.size(), path);
     std::copy(values.begin(), values.end(), out);
   };
   for (const auto& [name, values] : normalisers()) *values = vector_of(file, name, values->size(), path);
   units_ = std::make_unique<Units>(statistics_, *data_.language, leads());
-  load("weights", weights_.data());
-  load("average", average_.data());
-  load("adam.m", m_.data());
-  load("adam.v", v_.data());
+  load("weights", state_.weights.data());
+  load("average", state_.average.data());
+  load("adam.m", state_.m.data());
+  load("adam.v", state_.v.data());
+  to_device();
   step_ = static_cast<long>(number_of(file, "step", path));
   // In another part there are other demonstrations: validations are counted anew.
   if (const auto part = file.metadata.find("until");
