@@ -27,10 +27,10 @@ WORLDS = {**ENGINES, "mujoco3": "MuJoCo 3.14", "physx": "PhysX 5.6", "bullet_own
 POLICIES = {
     "dstar": "dstar",
     "dp": "dp",
-    "dstar_answer": "dstar, network `answer`",
-    "dstar_answer+servo": "dstar, network `answer`, with the servo",
-    "dp_answer": "dp, network `answer`",
-    "dp_answer+servo": "dp, network `answer`, with the servo",
+    "dstar_lead": "dstar, network `lead`",
+    "dstar_lead+servo": "dstar, network `lead`, with the servo",
+    "dp_lead": "dp, network `lead`",
+    "dp_lead+servo": "dp, network `lead`, with the servo",
     "dstar_shuffled": "dstar, partner of another clip",
     "retrieval": "retrieval",
     "replay": "replay (knows the motion)",
@@ -137,16 +137,17 @@ def rule(folder):
     """Success of policies, then of controls, under the rule `interaction`, by task; beside it the detectors of the robot."""
     file, rows, table = f"{folder}/leaderboard.csv", rows_of(folder, "leaderboard.csv"), []
     by_rule = rows_of(folder, "interaction.csv")
+    tasks = {task: title for task, title in TASKS.items() if task in {r["task"] for r in rows}}
     for policy, name in policies_and_controls({r["policy"] for r in rows}).items():
         def value(task, name="success", of=""):
             return figure(rows, file, policy=policy, task=task, name=name, of=of)
         every = value("all")
-        counts = [f"{value(task)['k']}/{value(task)['n']}" for task in TASKS]
+        counts = [f"{value(task)['k']}/{value(task)['n']}" for task in tasks]
         others = [percent(value("all", of=f"robot/{thresholds}")["value"]) for thresholds in ("act", "strict", "paper")]
         early = figure(by_rule, f"{folder}/interaction.csv", policy=policy, task="all", name="false_starts")
         table.append([name, every["n"], with_interval(every), *counts, *others, f"{early['value']}/{early['n']}", value("all", "fell")["value"]])
-    header = ["Policy", "n", "interaction", *TASKS.values(), "robot/act", "robot/strict", "robot/paper", "False starts", "Fell"]
-    return markdown(header, [False] + [True] * 13, table)
+    header = ["Policy", "n", "interaction", *tasks.values(), "robot/act", "robot/strict", "robot/paper", "False starts", "Fell"]
+    return markdown(header, [False] + [True] * (len(header) - 1), table)
 
 
 def people(folder, run):

@@ -22,8 +22,6 @@ namespace {
 using Words = std::vector<std::string>;
 using Weights = std::map<std::string, double>;
 
-// Who begins is as much of a command as what is done: leading_prompt.
-constexpr std::string_view kLeads = "first", kLeadsConcept = "begin";
 constexpr double kConceptWeight = 1.0, kWordWeight = 0.25, kFunctionWordWeight = 0.04, kNgramWeight = 0.06;
 constexpr std::size_t kLongestPhrase = 3;  // words
 
@@ -85,7 +83,6 @@ class BuiltInLanguage final : public LanguageEncoder {
   BuiltInLanguage() {
     for (const std::string_view word : function_words()) function_words_.insert(stem(std::string(word)));
     for (const Task task : all_tasks()) add_phrases(definition_of(task));
-    lexicon_[std::string(kLeads)] = {std::string(kLeadsConcept), 1.0};
   }
   [[nodiscard]] std::string_view name() const override { return kBuiltInLanguage; }
   [[nodiscard]] int size() const override { return kLanguageSize; }
@@ -213,7 +210,7 @@ class LanguageTable final : public LanguageEncoder {
 
 std::string_view task_prompt(Task task) { return definition_of(task).prompt; }
 std::span<const std::string_view> task_paraphrases(Task task) { return definition_of(task).paraphrases; }
-std::string leading_prompt(std::string_view prompt) { return fmt::format("{} {}", prompt, kLeads); }
+std::string leading_prompt(std::string_view prompt) { return fmt::format("{} first", prompt); }
 
 std::unique_ptr<LanguageEncoder> built_in_language() { return std::make_unique<BuiltInLanguage>(); }
 

@@ -188,6 +188,7 @@ std::string label_of(const SyntheticClip& clip) {
   if (clip.variant->target_height) label += fmt::format(" {}", *clip.variant->target_height);
   if (clip.variant->distance) label += fmt::format(" distance={}", *clip.variant->distance);
   if (clip.variant->outcome) label += fmt::format(" {}", name_of(act_outcome_names(), *clip.variant->outcome));
+  if (clip.variant->still) label += fmt::format(" still={}", *clip.variant->still);
   return label;
 }
 

@@ -41,6 +41,7 @@ void vary(const ClipVariant& variant, SynthesisOptions& options) {
   options.target_height = variant.target_height;
   if (variant.distance) options.distance = variant.distance;
   if (variant.outcome) options.outcome = variant.outcome;
+  if (variant.still) options.still = variant.still;
 }
 
 Tags tags_of(const ClipVariant& variant) {

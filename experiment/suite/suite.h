@@ -113,6 +113,7 @@ struct ClipVariant {
   std::optional<double> target_height{};  // [m]
   std::optional<double> distance{};       // of the roots at the start [m]
   std::optional<ActOutcome> outcome{};    // of people only
+  std::optional<bool> still{};            // of gestures that vary: the partner has no part in it
 };
 
 // Gives what the variant asks for to the options of its clip.

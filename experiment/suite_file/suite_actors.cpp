@@ -241,7 +241,11 @@ const FieldTable<ClipVariant>& variant_fields() {
       field<ClipVariant>({.name = "side", .choices = choices_of(side_names())}, &ClipVariant::side),
       field<ClipVariant>({.name = "target_height", .unit = "m"}, &ClipVariant::target_height),
       field<ClipVariant>({.name = "distance", .unit = "m"}, &ClipVariant::distance),
-      field<ClipVariant>({.name = "outcome", .choices = choices_of(act_outcome_names())}, &ClipVariant::outcome)};
+      field<ClipVariant>({.name = "outcome", .choices = choices_of(act_outcome_names())}, &ClipVariant::outcome),
+      field<ClipVariant>({.name = "still",
+                          .meaning = "varied, of a gesture: whether the partner stands still",
+                          .choices = flag_words()},
+                         &ClipVariant::still)};
   return table;
 }
 
@@ -251,8 +255,8 @@ ClipVariant read_variant(const YAML::Node& node, const std::string& file) {
   static_cast<void>(item.text("name"));  // it has to be there
   read_fields(item, variant_fields(), variant);
   if (!is_plain_name(variant.name)) item.fail_key("name", plain_name_message(variant.name));
-  if (!variant.side && !variant.target_height && !variant.distance && !variant.outcome)
-    item.fail(item.line(), "expected side, target_height, distance or outcome, found none");
+  if (!variant.side && !variant.target_height && !variant.distance && !variant.outcome && !variant.still)
+    item.fail(item.line(), "expected side, target_height, distance, outcome or still, found none");
   return variant;
 }
 

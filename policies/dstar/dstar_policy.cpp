@@ -103,7 +103,7 @@ class DstarPolicy final : public Policy {
 struct ShippedNetwork {
   std::string_view name, suffix;
 };
-constexpr std::array kShipped = {ShippedNetwork{"braced", "_braced"}, ShippedNetwork{"answer", "_answer"},
+constexpr std::array kShipped = {ShippedNetwork{"braced", "_braced"}, ShippedNetwork{"lead", "_lead"},
                                  ShippedNetwork{"student", ""}};
 
 // The options of a suite; an empty language is the one that is built in.
@@ -117,8 +117,9 @@ const FieldTable<DstarOptions>& dstar_options() {
   static const FieldTable<O> table = {
       duet::field<O>(
           {.name = "network",
-           .meaning = "braced, answer (learnt from a robot that answers its partner) or student (the oldest), or "
-                      "the path of a network"},
+           .meaning =
+               "braced, lead (learnt from a robot that answers its partner, and begins where the command says so) "
+               "or student (the oldest), or the path of a network"},
           &O::network),
       duet::field<O>({.name = "language", .meaning = "path of an NPZ table of prompts and their embeddings"},
                      &O::language),

@@ -6,6 +6,7 @@
 
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/work/run_work.h"
+#include "duet/metrics/interaction.h"
 #include "tests/experiment/fixtures.h"
 
 namespace duet {
@@ -69,6 +70,20 @@ TEST(ClipVariants, PeopleMayStandCloseWalkUpHesitateAndBreakOff) {
   EXPECT_LT(nearest_hands(clips[2]), 0.1);
   EXPECT_GT(nearest_hands(clips[3]), 0.15);
   EXPECT_EQ(clips[3].clip_id, "people-handshake-s42-0000-breaks_off");
+}
+
+TEST(ClipVariants, AWaveMayBeTheRobotsToBegin) {
+  const Suite suite = parse_suite(
+      "schema: duet.suite/1\nname: v\nversion: 1.0.0\ntasks: [wave]\nengines: [playback]\ncontrollers: [pd]\n"
+      "policies: [replay]\nretarget: {stage1-iterations: 1, stage2-iterations: 0}\nclips:\n  synth: {per_task: 1,\n"
+      "    like: varied, variants: [{name: first, still: true}, {name: second, still: false}]}\n",
+      "v.yaml");
+  Progress quiet(Progress::Style::kQuiet);
+  const std::vector<PairedMotion> clips = prepare_clips(suite, *test::g1(), 1, quiet);
+  ASSERT_EQ(clips.size(), 2U);
+  EXPECT_EQ(clips[0].clip_id, "varied-wave-s42-0000-first");
+  EXPECT_FALSE(partner_begins(clips[0].task, clips[0].source_partner.joints));
+  EXPECT_TRUE(partner_begins(clips[1].task, clips[1].source_partner.joints));
 }
 
 }  // namespace

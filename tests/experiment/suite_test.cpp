@@ -201,6 +201,9 @@ TEST(Suite, VariantsThatCannotBeAreRefused) {
         "[{name: 'a b', side: left}]", "[{name: a, side: left}, {name: a, side: right}]", "3"})
     EXPECT_SENTENCE(with(text));
   EXPECT_SENTENCE(refusal("", with_synth("{per_task: 1, variants: [{name: a, target_height: 1}]}", "[bend]")));
+  EXPECT_SENTENCE(refusal("", with_synth("{per_task: 1, variants: [{name: a, still: perhaps}]}", "[wave]")));
+  EXPECT_SENTENCE(refusal("", with_synth("{per_task: 1, like: varied, variants: [{name: a, still: true}]}", "[hug]")));
+  EXPECT_SENTENCE(refusal("", with_synth("{per_task: 1, like: people, variants: [{name: a, still: true}]}", "[wave]")));
 }
 
 TEST(Suite, ARobotThatIsNotThereIsRefusedByItsName) {
