@@ -96,19 +96,26 @@ TEST(ShippedSuiteNote, OfASuiteOfOnesOwnIsEmpty) {
 }
 
 // Their digests were committed before the suite was run.
-TEST(ShippedSuites, SealedClipsAreThoseOfTheTestSplit) {
-  Suite sealed = load_suite(suite_file("sealed"));
+class SealedSuites : public ::testing::TestWithParam<std::pair<const char*, int>> {};  // and the clips of one of a task
+
+TEST_P(SealedSuites, HaveTheClipsOfTheTestSplit) {
+  Suite sealed = load_suite(suite_file(GetParam().first));
   sealed.tasks = {Task::kHandshake, Task::kFlyKiss};
   sealed.clips.synth_per_task = 1;
   Progress quiet(Progress::Style::kQuiet);
   std::istringstream lines(split_text(sealed, 1, quiet));
   const std::string split = read_text(share_file("test split", "policies/dstar/test_split.txt"));
   std::string line;
-  EXPECT_TRUE(std::getline(lines, line) && line.starts_with("# The clips of hhoi-sealed 1.0.0"));
+  EXPECT_TRUE(std::getline(lines, line) &&
+              line.starts_with("# The clips of " + sealed.name + " " + sealed.version + ":"));
   int clips = 0;
   for (; std::getline(lines, line); ++clips) EXPECT_THAT(split, HasSubstr(line + "\n"));
-  EXPECT_EQ(clips, 4);  // either role
+  EXPECT_EQ(clips, GetParam().second);
 }
+
+INSTANTIATE_TEST_SUITE_P(Ship, SealedSuites,
+                         ::testing::Values(std::pair{"sealed", 4}, std::pair{"sealed_varied", 2}),  // in either role
+                         [](const auto& info) { return std::string(info.param.first); });
 
 // Rows of before compare with those of now only where these stay.
 TEST(ShippedSuites, OfBeforeKeepTheirHash) {
