@@ -68,7 +68,8 @@ TEST_P(PublishedTables, AreWhatTheRowsSay) {
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     EXPECT_TRUE(written.contains(entry.path().filename().string())) << entry.path();
 }
-INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables, testing::Values("policies", "sealed", "interaction", "real"),
+INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables,
+                         testing::Values("policies", "sealed", "sealed_varied", "interaction", "lead", "real"),
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace
