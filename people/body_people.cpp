@@ -28,12 +28,7 @@ void check_clock(const std::array<BodyMotion, 2>& people) {
 }
 
 void pose(RawPeople& raw, std::size_t who, BodyMotion motion, const BodyModel& model) {
-  const RestJoints rest = rest_joints(model, motion.betas);
-  raw.joints[who] = PointTracks(motion.frames(), kSmplJoints);
-  for (int t = 0; t < motion.frames(); ++t)
-    pose_body(rest, motion.translation[t],
-              std::span(motion.local).subspan(static_cast<std::size_t>(t) * kSmplJoints, kSmplJoints),
-              raw.joints[who].frame(t));
+  raw.joints[who] = pose_motion(motion, model);
   raw.rotations[who] = std::move(motion.local);
 }
 
@@ -59,6 +54,15 @@ BodyMotion body_motion(const std::string& file, const NumberTable& root, const N
       local[j + 1] = rotation_of_vector(Eigen::Map<const Eigen::Vector3d>(turns + 3 * j));
   }
   return motion;
+}
+
+PointTracks pose_motion(BodyMotion& motion, const BodyModel& model) {
+  const RestJoints rest = rest_joints(model, motion.betas);
+  PointTracks joints(motion.frames(), kSmplJoints);
+  for (int t = 0; t < motion.frames(); ++t)
+    pose_body(rest, motion.translation[static_cast<std::size_t>(t)],
+              std::span(motion.local).subspan(static_cast<std::size_t>(t) * kSmplJoints, kSmplJoints), joints.frame(t));
+  return joints;
 }
 
 std::vector<double> mean_betas(const NumberTable& betas) {

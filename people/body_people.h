@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "duet/motion/people/raw_people.h"
+#include "duet/people/bodies/body_model.h"
 #include "duet/people/bodies/number_table.h"
 #include "duet/people/people_format.h"
 
@@ -27,6 +28,9 @@ struct BodyMotion {
 // [m]. Any shape with rows of those sizes. Throws InputError naming the table.
 BodyMotion body_motion(const std::string& file, const NumberTable& root, const NumberTable& body,
                        const NumberTable& translation);
+
+// The joints (T, 24) of a motion by its model [m]; its rotations become global.
+PointTracks pose_motion(BodyMotion& motion, const BodyModel& model);
 
 // The mean over rows where there are several: a person does not change shape.
 std::vector<double> mean_betas(const NumberTable& betas);

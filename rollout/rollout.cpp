@@ -215,8 +215,11 @@ Rollout roll_out(const Episode& episode, World& world, ReferenceSource& source, 
   int tick = 0;
   for (; tick < episode.ticks && recording.outcome == Outcome::kOk; ++tick) {
     if (somebody) partner = partner_joints(others, tick);
+    const HumanJoints* seen = somebody ? world.seen_partner() : nullptr;
+    if (seen != nullptr && world.records_what_it_sees()) partner = *seen;
     deadline.pause();  // a plan is the policy's, which has limits of its own
-    const Reference* reference = source.at({tick, world.state(), somebody ? &partner : nullptr});
+    const Reference* reference =
+        source.at({tick, world.state(), seen != nullptr ? seen : (somebody ? &partner : nullptr)});
     deadline.go_on();
     if (reference == nullptr) {
       recording.outcome = Outcome::kError;

@@ -75,6 +75,11 @@ class World {
   virtual const Eigen::VectorXd& target(const Reference& reference) = 0;
   // The 20 ms of this tick. `partner`: SMPL joints, frame 0 at tick 0; empty: nobody.
   virtual Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) = 0;
+  // The partner as the world's own sensors have them by now; null: it has none, and the policy sees the episode's
+  // partner.
+  [[nodiscard]] virtual const HumanJoints* seen_partner() const { return nullptr; }
+  // Whether nobody knows better where the partner is: the recording then has what was seen.
+  [[nodiscard]] virtual bool records_what_it_sees() const { return false; }
   // Why it ended the episode; empty: what the outcome says of itself.
   [[nodiscard]] virtual std::string message() const { return ""; }
   // Writes the world's measurements into the rollout.

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <utility>
 
 #include "duet/core/file.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
 #include "duet/core/robot_state.h"
 #include "duet/hardware/guard/guard_loop.h"
@@ -30,7 +32,10 @@ GuardedEpisode guarded_episode(const RolloutSetup& setup, const RobotModel& robo
   episode.act_end = setup.reference.phases.act_end;
   episode.watch = options.watch;
   episode.keeps_distance = options.config.twin && options.config.person;
-  if (options.config.twin) episode.person = partner_of_clip(partner);  // a robot's camera speaks for itself
+  const bool by_clip = options.config.twin && !options.own_camera && !partner.empty();
+  if (by_clip) episode.person = partner_of_clip(partner, options.camera);
+  episode.perceives = options.own_camera || (by_clip && !options.policy_sees_clip);
+  episode.records_seen = options.own_camera;
   return episode;
 }
 
@@ -43,6 +48,7 @@ Rollout roll_out_guarded(const RolloutSetup& setup, const std::shared_ptr<const 
   run.interrupted = std::exchange(rollout.interrupted, false);
   run.clamps = world.clamps();
   run.held_ticks = world.held_ticks();
+  run.unseen_ticks = world.unseen_ticks();
   run.guard_seconds = world.report().now - world.began_at();
   run.missed_reports = world.missed_reports();
   if (!options.recording.empty()) save_logged_run(rollout.recording, run.executed, options.recording);
@@ -148,10 +154,44 @@ std::string place_of(const GuardReport& report) {
 
 }  // namespace
 
-PartnerSource partner_of_clip(PointTracks partner) {
-  return [partner = std::move(partner)](int tick, HumanJoints& joints) {
-    if (partner.empty() || !sees_at(tick)) return false;
-    joints = partner_joints(partner, tick);
+TwinCamera parse_twin_camera(const std::string& text) {
+  struct Word {
+    const char* name;
+    double TwinCamera::*value;
+    double most;
+  };
+  static constexpr Word kWords[] = {{"noise", &TwinCamera::noise, 1.0},
+                                    {"latency", &TwinCamera::latency, 0.25},
+                                    {"unseen", &TwinCamera::unseen, 1.0},
+                                    {"jumps", &TwinCamera::jumps, 1.0}};
+  TwinCamera camera;
+  if (text.empty()) return camera;
+  for (const std::string_view word : split(text, ',')) {
+    const std::size_t equals = word.find('=');
+    const auto* known = std::find_if(std::begin(kWords), std::end(kWords),
+                                     [&](const Word& one) { return word.substr(0, equals) == one.name; });
+    const std::optional<double> value =
+        equals == std::string_view::npos ? std::nullopt : parse_number(word.substr(equals + 1));
+    require(known != std::end(kWords) && value && *value >= 0.0 && *value <= known->most,
+            "a twin's camera: expected noise (to 1 m), latency (to 0.25 s), unseen or jumps (shares to 1) with a value, "
+            "as 'noise=0.02,latency=0.1', found '{}'",
+            excerpt(word));
+    camera.*known->value = *value;
+  }
+  return camera;
+}
+
+PartnerSource partner_of_clip(PointTracks partner, const TwinCamera& camera) {
+  static constexpr double kAside = 1.0;  // of somebody else who is taken for the person [m]
+  Random random(camera.seed, stream_key({"twin-camera"}));
+  const int late = ticks_of(camera.latency);
+  return [partner = std::move(partner), camera, random, late](int tick, PersonMessage& seen) mutable {
+    if (partner.empty() || !sees_at(tick) || random.chance(camera.unseen)) return false;
+    seen.joints = partner_joints(partner, tick - late);
+    seen.latency = late * kTick;
+    if (random.chance(camera.jumps)) seen.joints.row(1).array() += kAside;
+    if (camera.noise > 0.0)
+      for (Eigen::Index k = 0; k < seen.joints.size(); ++k) seen.joints.data()[k] += camera.noise * random.normal();
     return true;
   };
 }
@@ -193,8 +233,13 @@ void GuardedWorld::plan(const VelocityCommand& root, const Eigen::VectorXd& q, b
 void GuardedWorld::wait_for_run(const Pose& start) {
   const double asked_at = report_.now;
   stand_off_ = episode_.keeps_distance ? kStandOff : 0.0;
-  while (report_.state != SafetyState::kRun || stand_off_ > 0.0) {
-    if (report_.state >= SafetyState::kDamp || report_.now - asked_at > episode_.most_wait)
+  while (report_.state != SafetyState::kRun || stand_off_ > 0.0 || (episode_.perceives && !report_.tracked)) {
+    const bool late = report_.now - asked_at > episode_.most_wait;
+    if (late && report_.state == SafetyState::kRun)
+      throw std::runtime_error(fmt::format("{} tracks nobody: an episode begins with a person whom the robot sees; none "
+                                           "was there for {:.1f} s",
+                                           link_.name(), report_.now - asked_at));
+    if (report_.state >= SafetyState::kDamp || late)
       throw std::runtime_error(fmt::format("{} does not run: it is at {} after {:.1f} s", link_.name(),
                                            place_of(report_), report_.now - asked_at));
     if (report_.state == SafetyState::kRun) stand_off_ = std::max(stand_off_ - kWalkUp * kTick, 0.0);
@@ -234,14 +279,15 @@ void GuardedWorld::take_state() {
   state_ = report_.robot;
   state_.X_WB = {R_EO * report_.robot.X_WB.R, R_EO * (report_.robot.X_WB.p - p_OE_)};
   state_.v_WB = R_EO * report_.robot.v_WB;
+  if (report_.tracked)
+    for (int j = 0; j < kSmplJoints; ++j) seen_.col(j) = R_EO * (report_.person.col(j) - p_OE_);
   for (std::size_t k = 0; k < kClampReasons; ++k) clamps_[k] = report_.clamps[k] - clamps_before_[k];
 }
 
 void GuardedWorld::show_person(int tick) {
-  HumanJoints joints;
-  if (!episode_.person || !episode_.person(tick, joints)) return;
+  if (!episode_.person || !episode_.person(tick, person_)) return;
   const Eigen::Quaterniond R_OE = yaw_rotation(yaw_OE_);
-  for (int j = 0; j < joints.cols(); ++j) person_.joints.col(j) = p_OE_ + R_OE * joints.col(j);
+  for (int j = 0; j < kSmplJoints; ++j) person_.joints.col(j) = p_OE_ + R_OE * person_.joints.col(j).eval();
   if (stand_off_ > 0.0) {
     Eigen::Vector3d away = person_.joints.col(0) - report_.robot.X_WB.p;
     away.z() = 0.0;
@@ -269,6 +315,7 @@ Outcome GuardedWorld::advance(int tick, const PointTracks&, Deadline&) {
   if (!next()) return Outcome::kError;
   take_state();
   if (report_.state == SafetyState::kHold) ++held_ticks_;
+  if (!report_.tracked) ++unseen_ticks_;
   if (has_fallen(state_, fall_)) return Outcome::kFell;
   if (report_.state == SafetyState::kRun || report_.state == SafetyState::kHold) return Outcome::kOk;
   message_ = fmt::format("{} ended the run at {:.2f} s: {}", link_.name(), (tick + 1) * kTick, place_of(report_));

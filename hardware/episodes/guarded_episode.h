@@ -23,10 +23,21 @@ namespace duet {
 // law of supplement A.4.3, its joints targets, both go to the guard, and what the guard reports is the state. The world
 // is laid so that the episode's start is where the robot stands. One owner, one thread.
 
-// Where the person's joints are, in the frame of the episode, at a tick of it [m]; false where nobody sees them now.
-using PartnerSource = std::function<bool(int tick, HumanJoints& joints)>;
+// An estimate of the person at a tick of the episode, in its frame; false where there is none now.
+using PartnerSource = std::function<bool(int tick, PersonMessage& seen)>;
+
+// The defects of a twin's camera and estimator.
+struct TwinCamera {
+  double noise = 0.0;    // on each axis of each joint, standard deviation [m]
+  double latency = 0.0;  // from picture to message, to the nearest tick [s]
+  double unseen = 0.0;   // share of pictures without an estimate
+  double jumps = 0.0;    // share of pictures in which somebody else is taken for the person, 1 m aside
+  std::uint64_t seed = 1;
+};
+// Throws std::invalid_argument naming the word: "noise=0.02,latency=0.1,unseen=0.05,jumps=0.01", each once at most.
+TwinCamera parse_twin_camera(const std::string& text);
 // A person who is where the clip has them, as an estimator sees them 30 times a second.
-PartnerSource partner_of_clip(PointTracks partner);
+PartnerSource partner_of_clip(PointTracks partner, const TwinCamera& camera = {});
 
 struct GuardedEpisode {
   OdometrySource odometry = OdometrySource::kTwin;
@@ -35,6 +46,9 @@ struct GuardedEpisode {
   std::vector<int> joints;         // that the guard's limiter moves: what is executed of the reference beside the root
   int act_begin = 0, act_end = 0;  // ticks in which the task's parts may touch
   PartnerSource person = {};       // empty: the guard hears of nobody
+  bool perceives = false;          // the policy sees the person whom the guard tracks, and nobody else; without one the
+                                   // episode does not begin, and one who is lost stays where they were last seen
+  bool records_seen = false;       // and so does the recording: nobody knows better
   bool keeps_distance = false;     // the guard minds the person, who comes near once the robot runs: until then it
                                    // would not even stand up beside them
   double most_wait = 30.0;         // for the guard to run, by its clock [s]
@@ -54,12 +68,15 @@ class GuardedWorld final : public World {
   const Eigen::VectorXd& target(const Reference& reference) override;
   // A guard that has gone or ended the run is kError, a robot that fell kFell; while it holds, the episode goes on.
   Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) override;
+  [[nodiscard]] const HumanJoints* seen_partner() const override { return episode_.perceives ? &seen_ : nullptr; }
+  [[nodiscard]] bool records_what_it_sees() const override { return episode_.records_seen; }
   [[nodiscard]] std::string message() const override { return message_; }
 
   // Plans to stand for so long after the episode [s]; then whoever is next may have the robot.
   void rest(double seconds);
 
   // Counts over the episode's ticks.
+  [[nodiscard]] int unseen_ticks() const { return unseen_ticks_; }  // nobody was tracked
   [[nodiscard]] int held_ticks() const { return held_ticks_; }  // the guard held
   [[nodiscard]] const ClampCounts& clamps() const { return clamps_; }
   [[nodiscard]] int missed_reports() const { return missed_; }         // that were lost between two
@@ -87,18 +104,22 @@ class GuardedWorld final : public World {
   GuardReport report_;
   PlannerMessage message_to_guard_;
   PersonMessage person_;
+  HumanJoints seen_ = HumanJoints::Zero();  // by the guard's camera, frame E
   Eigen::VectorXd target_;
   int tick_ = 0;
   double stand_off_ = 0.0;  // by which the person is further away than the clip has them [m]
   SafetyState last_state_ = SafetyState::kOffline;
   ClampCounts clamps_before_{}, clamps_{};
-  int held_ticks_ = 0, missed_ = 0;
+  int held_ticks_ = 0, missed_ = 0, unseen_ticks_ = 0;
   double began_at_ = 0.0;
   std::string message_;
 };
 
 struct GuardedOptions {
   RobotConfig config;
+  bool own_camera = false;  // the guard hears of the person from an estimator; else, beside a twin, from the clip by
+  TwinCamera camera = {};
+  bool policy_sees_clip = false;  // beside a twin: the policy sees the clip's partner in the place of the tracked one
   double steps_from = 0.0;  // of the walking controller [m/s]
   std::string engine;       // that stands in the row: "twin"
   std::string recording;    // path of the recording to make (NPZ); empty: none
@@ -111,6 +132,7 @@ struct GuardedRun {
   ExecutedMask executed;
   ClampCounts clamps{};
   int held_ticks = 0;        // in which the guard held
+  int unseen_ticks = 0;      // in which it tracked nobody
   int missed_reports = 0;    // of the guard, that were lost on their way
   double guard_seconds = 0;  // of the episode, by the guard's clock [s]
   bool interrupted = false;  // by stop_asked: the row is no result

@@ -8,7 +8,7 @@
 namespace duet {
 namespace {
 
-constexpr std::uint32_t kVersion = 0x44475532;  // "DGU2"
+constexpr std::uint32_t kVersion = 0x44475533;  // "DGU3"
 
 struct GuardHead {
   std::uint32_t version, kind;
@@ -25,11 +25,12 @@ struct PlannerBody {
 
 struct PersonBody {
   GuardHead head;
-  double joints[3 * 24];  // x, y, z of each
+  double latency;
+  double joints[3 * kSmplJoints];  // x, y, z of each
 };
 
 static_assert(sizeof(GuardHead) == 16 && sizeof(PlannerBody) == 16 + 8 * (5 + kG1Motors + 9));
-static_assert(sizeof(PersonBody) == 16 + 8 * 72 && sizeof(PersonBody) <= kMostGuardBytes);
+static_assert(sizeof(PersonBody) == 16 + 8 * 73 && sizeof(PersonBody) <= kMostGuardBytes);
 static_assert(sizeof(PlannerBody) != sizeof(PersonBody) && std::endian::native == std::endian::little);
 
 GuardHead head_of(GuardMessageKind kind, std::uint64_t sequence) {
@@ -69,6 +70,7 @@ bool read_person(std::span<const std::byte> datagram, PersonMessage& message) {
   PersonBody body;
   if (!get(datagram, body)) return false;
   message.sequence = body.head.sequence;
+  message.latency = body.latency;
   std::memcpy(message.joints.data(), body.joints, sizeof(body.joints));
   return true;
 }
@@ -95,7 +97,7 @@ std::size_t encode(const PlannerMessage& message, GuardBuffer& buffer) {
 }
 
 std::size_t encode(const PersonMessage& message, GuardBuffer& buffer) {
-  PersonBody body{head_of(GuardMessageKind::kPerson, message.sequence), {}};
+  PersonBody body{head_of(GuardMessageKind::kPerson, message.sequence), message.latency, {}};
   std::memcpy(body.joints, message.joints.data(), sizeof(body.joints));
   return put(body, buffer);
 }
@@ -121,15 +123,16 @@ GuardMessageKind decode(std::span<const std::byte> datagram, GuardMessage& messa
 
 namespace {
 
-constexpr std::uint64_t kReportVersion = 0x3152475544;  // "DUGR1"
+constexpr std::uint64_t kReportVersion = 0x3252475544;  // "DUGR2"
 
 struct ReportBody {
   std::uint64_t version, tick, planner_sequence, state, cause, odometry, old_messages;
   double now, odometry_at;
-  std::uint64_t reserved[3];
+  std::uint64_t tracked, reserved[2];
   double root_pose[7], root_velocity[3], root_gyro[3];  // position, quaternion x, y, z, w
   double q[kG1Motors], v[kG1Motors], tau[kG1Motors], q_target[kG1Motors];
   double root[4];
+  double person[3 * kSmplJoints];
   std::int64_t clamps[kClampReasons];
 };
 static_assert(sizeof(ReportBody) == kReportBytes && std::endian::native == std::endian::little);
@@ -179,6 +182,7 @@ void fill_report(const RobotGuard& guard, GuardReport& report) {
   report.q_target = guard.joints().q_target;
   report.root = status.limited.root;
   report.clamps = status.clamps;
+  report.tracked = guard.tracked(report.person);
 }
 
 GuardReport report_of(const RobotGuard& guard) {
@@ -210,6 +214,8 @@ void encode(const GuardReport& report, ReportBuffer& buffer) {
   const double root[4] = {report.root.forward, report.root.lateral, report.root.yaw_rate, report.root.height};
   std::memcpy(body.root, root, sizeof(root));
   for (std::size_t k = 0; k < kClampReasons; ++k) body.clamps[k] = report.clamps[k];
+  body.tracked = report.tracked ? 1 : 0;
+  std::memcpy(body.person, report.person.data(), sizeof(body.person));
   std::memcpy(buffer.data(), &body, sizeof(body));
 }
 
@@ -227,10 +233,12 @@ bool decode(std::span<const std::byte> datagram, GuardReport& report) {
   report.odometry_at = body.odometry_at;
   report.old_messages = static_cast<long>(body.old_messages);
   for (std::size_t k = 0; k < kClampReasons; ++k) report.clamps[k] = body.clamps[k];
+  report.tracked = body.tracked != 0;
+  std::memcpy(report.person.data(), body.person, sizeof(body.person));
   get_root(body, report);
   const bool joints = get_vector(body.q, report.robot.q) && get_vector(body.v, report.robot.v) &&
                       get_vector(body.tau, report.tau) && get_vector(body.q_target, report.q_target);
-  return joints && root_is_sane(report) && std::isfinite(body.now);
+  return joints && root_is_sane(report) && std::isfinite(body.now) && report.person.allFinite();
 }
 
 std::string report_path(const std::string& socket) { return socket + ".report"; }

@@ -50,6 +50,8 @@ struct GuardReport {
   VelocityCommand root;      // that came out of the limiter
   ClampCounts clamps{};
   long old_messages = 0;
+  bool tracked = false;  // a person is, and was not long ago
+  HumanJoints person = HumanJoints::Zero();  // where, for a policy (RobotGuard::tracked), in the frame of odometry [m]
 
   GuardReport();
 };
@@ -58,7 +60,7 @@ GuardReport report_of(const RobotGuard& guard);
 // Fills the report in place; no allocation.
 void fill_report(const RobotGuard& guard, GuardReport& report);
 
-inline constexpr std::size_t kReportBytes = 8 * (12 + 13 + 4 * kG1Motors + 4 + kClampReasons);
+inline constexpr std::size_t kReportBytes = 8 * (12 + 13 + 4 * kG1Motors + 4 + kClampReasons + 3 * kSmplJoints);
 using ReportBuffer = std::array<std::byte, kReportBytes>;
 void encode(const GuardReport& report, ReportBuffer& buffer);
 // False for anything that is not such a report, with numbers that are finite.

@@ -78,12 +78,13 @@ const Schema<LcmPlace>& lcm_schema() {
 }
 
 void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& config) {
-  const YamlSection section(file, node, "camera", {"position", "quat_wxyz"});
+  const YamlSection section(file, node, "camera", {"position", "quat_wxyz", "latency"});
   constexpr double kFarthest = 2.0;  // of a camera from the base [m]
-  config.X_BC.p = section.vector3("position");
-  if (config.X_BC.p.norm() > kFarthest)
+  Pose& X_BC = config.camera.X_BC;
+  X_BC.p = section.vector3("position");
+  if (X_BC.p.norm() > kFarthest)
     section.fail_key("position",
-                     fmt::format("expected at most {} m from the base, found {}", kFarthest, config.X_BC.p.norm()));
+                     fmt::format("expected at most {} m from the base, found {}", kFarthest, X_BC.p.norm()));
   const std::vector<YAML::Node> items = section.items("quat_wxyz");
   Eigen::Vector4d quat_wxyz = Eigen::Vector4d::Zero();
   for (std::size_t k = 0; k < std::min<std::size_t>(items.size(), 4); ++k)
@@ -91,7 +92,8 @@ void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& c
       section.fail_key("quat_wxyz", "expected 4 numbers, found others");
   if (items.size() != 4 || !(std::abs(quat_wxyz.norm() - 1.0) < 1e-3))
     section.fail_key("quat_wxyz", "expected a unit quaternion w, x, y, z, found another");
-  config.X_BC.R = Eigen::Quaterniond(quat_wxyz[0], quat_wxyz[1], quat_wxyz[2], quat_wxyz[3]).normalized();
+  X_BC.R = Eigen::Quaterniond(quat_wxyz[0], quat_wxyz[1], quat_wxyz[2], quat_wxyz[3]).normalized();
+  read_optional(section, {.name = "latency", .range = {0.0, SafetyRules{}.person.hold}}, config.camera.latency);
   config.has_camera = true;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "duet/hardware/executors/executor.h"
+#include "duet/hardware/guard/person_track.h"
 #include "duet/hardware/guard/robot_guard.h"
 #include "duet/hardware/wire/datagram_socket.h"
 #include "duet/hardware/wire/lcm_message.h"
@@ -75,7 +76,7 @@ struct RobotConfig {
   ExecutorKind executor = ExecutorKind::kTwin;
   OdometrySource odometry = OdometrySource::kTwin;
   LcmPlace lcm;  // of HOMIE's processes
-  Pose X_BC;     // of the camera on the base: what a person's joints come in
+  CameraMount camera;  // what a person's joints come in
   bool has_camera = false;
 
   [[nodiscard]] DdsPlace place() const { return {permission.domain, permission.interface}; }

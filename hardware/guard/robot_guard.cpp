@@ -83,18 +83,22 @@ void RobotGuard::receive(const PlannerMessage& message, double now) {
 // A pose that is not finite, or in which somebody jumped, is dropped: the one before grows old.
 void RobotGuard::receive(const PersonMessage& message, double now) {
   const bool first = next_.person_at == kNever;
-  const double passed = std::max(now - next_.person_at, setup_.limiter.dt);
+  const double exposed_at = now - message.latency;
+  const double passed = std::max(exposed_at - next_.person_at, setup_.limiter.dt);
   const double moved = first ? 0.0 : (message.joints - person_.joints).colwise().norm().maxCoeff();
-  if (!message.joints.allFinite() || moved > 0.1 + kPersonJump * passed) {
+  const bool finite = message.joints.allFinite() && message.latency >= 0.0 && std::isfinite(message.latency);
+  if (!finite || moved > 0.1 + kPersonJump * passed) {
     ++status_.bad_messages;
-    return;
+    return note_estimate(finite ? PersonFault::kJump : PersonFault::kFinite);
   }
-  const bool taken = person_order_.takes(message.sequence, now);
+  const bool taken = person_order_.takes(message.sequence, now) && (first || exposed_at > next_.person_at);
   count_streams();
+  note_estimate(taken ? PersonFault::kNone : PersonFault::kOld);
   if (!taken) return;
   person_speed_ = first ? 0.0 : (message.joints.col(0) - person_.joints.col(0)).norm() / passed;
   person_ = message;
-  next_.person_at = now;
+  track_.add(message.joints, exposed_at, now);
+  next_.person_at = exposed_at;
   count_streams();
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "duet/hardware/executors/executor.h"
+#include "duet/hardware/guard/person_track.h"
 #include "duet/hardware/guard/walker.h"
 #include "duet/hardware/safety/contact_watch.h"
 #include "duet/hardware/safety/limiter.h"
@@ -37,13 +38,6 @@ struct PlannerMessage {
   std::optional<Pose> goal = {};  // of the root, in the frame of odometry: what the velocity leads to; for the log
 };
 
-// The partner's joints in the frame of odometry, as somebody estimated them.
-struct PersonMessage {
-  std::uint64_t sequence = 0;
-  HumanJoints joints = HumanJoints::Zero();  // [m]
-  long sender_restarts = 0;                  // of who estimates, that whoever took the estimates noticed
-};
-
 // The status after the last tick, for logs and displays.
 struct GuardStatus {
   SafetyMemory safety;
@@ -56,6 +50,7 @@ struct GuardStatus {
   long old_messages = 0;   // of planner or perception, dropped
   long restarts = 0;       // of planner, perception and odometry: streams that were taken again after a pause
   long bad_messages = 0;   // of perception: not finite, or a person who jumped
+  PersonCounts person{};   // estimates of a person, by what became of them
   bool received = false;   // a planner's command was handed to the limiter
   bool restarted = false;  // the limiter began anew, from
   Eigen::VectorXd restart_q;
@@ -75,6 +70,8 @@ class RobotGuard {
   // `now`: reception, by the clock of tick().
   void receive(const PlannerMessage& message, double now);
   void receive(const PersonMessage& message, double now);
+  // Counts an estimate, and what became of it.
+  void note_estimate(PersonFault fault) { ++status_.person[static_cast<std::size_t>(fault)]; }
   void receive(const OdometrySample& sample);
   void receive(const BatteryReading& battery, double now);
   // Notes that the executor of the commands was heard of at `at`.
@@ -95,6 +92,8 @@ class RobotGuard {
   [[nodiscard]] const MotionCommand& planned() const { return planner_.command; }
   [[nodiscard]] const PlannerMessage& planner() const { return planner_; }
   [[nodiscard]] const OdometrySample& odometry() const { return odometry_; }
+  // The person as a policy sees them at the last tick (PersonTrack::at); false where nobody is tracked.
+  bool tracked(HumanJoints& joints) const { return track_.at(next_.now, joints, setup_.rules.person.hold); }
   // Place, speed and heading of odometry, tilt of the IMU, joints of the motors.
   [[nodiscard]] const RobotState& measured() const { return measured_; }
   [[nodiscard]] const JointCommand& joints() const {
@@ -126,6 +125,7 @@ class RobotGuard {
   bool planner_is_new_ = false;
   StreamOrder planner_order_, person_order_;
   PersonMessage person_;
+  PersonTrack track_;
   double person_speed_ = 0.0;
   OdometrySample odometry_;
   BatteryReading battery_;

@@ -80,6 +80,8 @@ std::string known(double value, const char* unit, int digits) {
 
 }  // namespace
 
+std::string estimate_name(std::size_t fault) { return fault == 0 ? "used" : std::string(kPersonFaultNames[fault]); }
+
 void fill_health(const RobotGuard& guard, GuardHealth& health) {
   const GuardStatus& status = guard.status();
   const SafetyInput& input = status.input;
@@ -108,6 +110,7 @@ void fill_health(const RobotGuard& guard, GuardHealth& health) {
   health.number_faults = status.number_faults;
   health.old_messages = status.old_messages;
   health.bad_messages = status.bad_messages;
+  health.person = status.person;
   health.restarts = status.restarts;
 }
 
@@ -153,6 +156,7 @@ nlohmann::json health_json(const HealthMessage& message) {
                          {"next", message.next}};
   for (const HealthNumber& number : kNumbers) json[number.name] = number_or_null(message.health.*number.value);
   for (const HealthCount& count : kCounts) json[count.name] = message.health.*count.value;
+  for (std::size_t k = 0; k < kPersonFaults; ++k) json["estimates"][estimate_name(k)] = message.health.person[k];
   return json;
 }
 
@@ -170,6 +174,9 @@ HealthMessage parse_health(std::string_view text, const std::string& name) {
     for (const HealthNumber& number : kNumbers)
       message.health.*number.value = json.at(number.name).is_null() ? kUnknown : json.at(number.name).get<double>();
     for (const HealthCount& count : kCounts) message.health.*count.value = count_from(json.at(count.name), name);
+    if (json.contains("estimates"))  // not in logs of before
+      for (std::size_t k = 0; k < kPersonFaults; ++k)
+        message.health.person[k] = count_from(json["estimates"].at(estimate_name(k)), name);
   } catch (const nlohmann::json::exception& error) {  // "[json.exception.out_of_range.403] key 'tilt' not found"
     const std::string_view what = error.what();
     throw InputError(fmt::format("{}: the health of a guard: {}", name, what.substr(what.find("] ") + 2)));
@@ -188,7 +195,9 @@ std::string health_text(const HealthMessage& message) {
                   age_text("dead-man switch", h.dead_man_age), age_text("executor", h.executor_age), 1e3 * h.late);
   text += fmt::format("  charge {}, hottest casing {:.0f} and winding {:.0f} degrees C, tilt {:.3f} rad\n",
                       known(h.charge, "%", 0), h.casing, h.winding, h.tilt);
-  text += fmt::format("  person: {}; {:.0f} % of all speeds\n", known(h.distance, "m away", 2), 100.0 * h.share);
+  const std::string estimates = person_counts_text(h.person);
+  text += fmt::format("  person: {}; {:.0f} % of all speeds{}\n", known(h.distance, "m away", 2), 100.0 * h.share,
+                      estimates.empty() ? "" : "; " + estimates);
   text += fmt::format("  tracking: {}{}\n", known(h.tracking, "rad at most off a target", 3),
                       message.tracking_joint.empty() ? "" : fmt::format(" ({})", message.tracking_joint));
   text += fmt::format(

@@ -31,6 +31,7 @@ struct GuardHealth {
   long ticks = 0, states = 0, checksum_faults = 0, tick_faults = 0, number_faults = 0;
   long old_messages = 0, bad_messages = 0, restarts = 0;
   long left_out = 0;  // ticks that the log has no room for
+  PersonCounts person{};  // estimates of a person, by what became of them
 };
 
 struct HealthMessage {
@@ -39,6 +40,9 @@ struct HealthMessage {
   std::string tracking_joint = {};  // whose angle `tracking` is
   std::string next = {};            // what the operator may do now
 };
+
+// The name of a count of estimates in messages: "used", "far", ...
+std::string estimate_name(std::size_t fault);
 
 // All that the guard knows but distance, tracking, `late` and `left_out`. No allocation.
 void fill_health(const RobotGuard& guard, GuardHealth& health);

@@ -77,6 +77,8 @@ class LogMessages {
     LogEvent event{time, word("state"), word("cause"), 0, 0, std::string(text)};
     event.dropped = number("dropped");
     event.restarts = number("restarts");
+    event.refused = number("refused");
+    if (event.refused > 0) event.why = word("why");
     if (parts_.event) parts_.event(event);
   }
 

@@ -18,6 +18,8 @@ struct LogEvent {
   long dropped = 0;   // ticks that are not in the log here
   long restarts = 0;  // streams that were taken again after a pause
   std::string text;   // as it stands in the log
+  long refused = 0;   // estimates of a person
+  std::string why = {};  // they were
 };
 
 // A function for each kind of message; those without a function are passed over. A tick comes before the frames of

@@ -23,6 +23,7 @@ constexpr std::size_t kSlots = 4096;  // of the ring: 8 s of ticks
 constexpr int kTicksPerHealth = 10;   // 50 Hz
 constexpr std::uint16_t kSetupChannel = 1, kTickChannel = 2, kFrameChannel = 3, kEventChannel = 4, kStateChannel = 5,
                         kHealthChannel = 6, kLimiterChannel = 7;
+constexpr double kRefusalsEvery = 1.0;  // event of refused estimates [s]
 
 // The maker's messages for readers of ROS 2, whose CDR is that of DDS.
 constexpr const char* kCommandSchema =
@@ -182,7 +183,7 @@ void RunLog::add_channels() {
   writer_.add({kTickChannel, "guard/tick", kTickEncoding, "", "", ""});
   writer_.add({kFrameChannel, "rt/lowcmd", "cdr", "unitree_hg/msg/LowCmd", "ros2msg", kCommandSchema});
   json_channel(kEventChannel, "guard/events", "duet.GuardEvent",
-               {{"state", ""}, {"cause", ""}, {"dropped", 0}, {"restarts", 0}});
+               {{"state", ""}, {"cause", ""}, {"dropped", 0}, {"restarts", 0}, {"refused", 0}, {"why", ""}});
   writer_.add({kStateChannel, "rt/lowstate", "cdr", "unitree_hg/msg/LowState", "ros2msg", kStateSchema});
   json_channel(kHealthChannel, "guard/health", "duet.GuardHealth", health_json({}));
   json_channel(kLimiterChannel, "guard/limiter", "duet.LimiterTick", limiter_json({}, setup_.limiter, 0.0, {}));
@@ -233,6 +234,7 @@ void RunLog::write_slots() {
   }
   if (const long rest = dropped_ - told_; rest > 0)
     write_event(nanoseconds(last_.tick.now), last_.state, last_.cause, "dropped", rest);
+  write_refusals(last_);
   if (!began_) write_setup(0);
   good_ = writer_.finish();
 }
@@ -254,7 +256,20 @@ void RunLog::write_slot(const Slot& slot) {
   if (slot.sent) write_frame(kFrameChannel, time, cdr_of(slot.frame));
   if (slot.changed) write_event(time, slot.state, slot.cause);
   if (slot.restarts > 0) write_event(time, slot.state, slot.cause, "restarts", slot.restarts);
+  if (slot.tick.now - refusals_at_ >= kRefusalsEvery) write_refusals(slot);
   if (ticks_to_health_-- <= 0) write_plain(slot, time);
+}
+
+// An event for each reason for which estimates of a person were refused since the last one.
+void RunLog::write_refusals(const Slot& slot) {
+  const PersonCounts& counts = slot.health.person;
+  for (std::size_t k = 1; k < kPersonFaults; ++k) {
+    if (k == static_cast<std::size_t>(PersonFault::kUnseen) || counts[k] == told_person_[k]) continue;
+    write_event(nanoseconds(slot.tick.now), slot.state, slot.cause, "refused", counts[k] - told_person_[k],
+                kPersonFaultNames[k]);
+    refusals_at_ = slot.tick.now;
+  }
+  told_person_ = counts;
 }
 
 void RunLog::write_setup(std::uint64_t time) {
@@ -291,10 +306,12 @@ void RunLog::write_json(std::uint16_t channel, std::uint64_t time, const nlohman
 }
 
 // A change of state, or that `n` ticks are not in the log here ("dropped"), or `n` streams were taken again after a
-// pause ("restarts").
-void RunLog::write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted, long n) {
+// pause ("restarts"), or `n` estimates of a person were refused, and `why` ("refused").
+void RunLog::write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted, long n,
+                         std::string_view why) {
   nlohmann::json event = {{"state", safety_state_name(state)}, {"cause", stop_cause_name(cause)}};
   if (counted != nullptr) event[counted] = n;
+  if (!why.empty()) event["why"] = why;
   write_json(kEventChannel, time, event);
 }
 

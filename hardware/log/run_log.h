@@ -98,10 +98,12 @@ class RunLog {
   void write_slots();
   void write_slot(const Slot& slot);
   void write_setup(std::uint64_t time);
+  void write_refusals(const Slot& slot);
   void write_plain(const Slot& slot, std::uint64_t time);
   void write_json(std::uint16_t channel, std::uint64_t time, const nlohmann::json& json);
   void add_channels();
-  void write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted = nullptr, long n = 0);
+  void write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted = nullptr, long n = 0,
+                   std::string_view why = {});
   void write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame);
 
   GuardSetup setup_;
@@ -113,6 +115,8 @@ class RunLog {
   SafetyState last_state_ = SafetyState::kOffline;
   std::atomic<long> dropped_ = 0;
   long told_ = 0, told_restarts_ = 0;  // by a slot
+  PersonCounts told_person_{};         // by an event
+  double refusals_at_ = kNever;        // of that event, by the guard's clock [s]
   Slot last_ = {};                     // that was written
   bool began_ = false;                 // a slot was written
   PersonGap gap_;

@@ -138,7 +138,8 @@ class ReportGatherer {
     report_.dropped += event.dropped;
     if (event.dropped > 0) add_fault("dropped", at, event.dropped);
     if (event.restarts > 0) add_fault("restarts", at, event.restarts);
-    if (event.dropped > 0 || event.restarts > 0 || event.state == state_) return;
+    if (event.refused > 0) add_fault("estimates refused: " + event.why, at, event.refused);
+    if (event.dropped > 0 || event.restarts > 0 || event.refused > 0 || event.state == state_) return;
     end_span();
     state_ = event.state;
     report_.spans.push_back({at, 0.0, event.state, event.cause});

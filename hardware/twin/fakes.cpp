@@ -186,6 +186,7 @@ bool PersonPlayer::next(PersonEstimate& estimate) {
   if (frame_ >= person_.frames()) return false;
   estimate.sequence = static_cast<std::uint64_t>(frame_) + 1;
   estimate.stamp = frame_ / play_.rate;
+  estimate.latency = play_.latency;
   estimate.seen = !random_.chance(play_.unseen);
   for (int j = 0; j < kSmplJoints; ++j) {
     const Eigen::Vector3d noise(random_.normal(), random_.normal(), random_.normal());

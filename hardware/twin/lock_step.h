@@ -92,6 +92,7 @@ class TwinInProcess final : public GuardLink {
   void pause(double seconds);
 
   [[nodiscard]] const RobotGuard& guard() const { return guard_; }
+  [[nodiscard]] RobotGuard& guard() { return guard_; }
   [[nodiscard]] TwinModel& twin() { return twin_; }
   [[nodiscard]] TwinOperator& operated() { return operator_; }
   TwinTrouble trouble;

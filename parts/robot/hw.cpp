@@ -61,7 +61,7 @@ RobotSideOptions side_options(const HardwareArguments& arguments, bool commands)
 
 std::optional<PersonInput> person_input(const RobotConfig& config, const HardwareArguments& arguments) {
   if (!config.has_camera) return std::nullopt;
-  return PersonInput(DatagramSocket::at_path(arguments.person_socket), config.X_BC);
+  return PersonInput(DatagramSocket::at_path(arguments.person_socket), config.camera);
 }
 
 void listen_for(Session& session, const HardwareArguments& arguments, bool with_planner) {
@@ -155,6 +155,10 @@ class ArmedRun {
     if (last_ == SafetyState::kListen && !armed_ && !status.safety.missing.empty())
       waits = fmt::format("lately missing: {}", status.safety.missing);
     if (last_ == SafetyState::kStand && !status.input.stands) waits = stand_waits(status);
+    const long refused = refused_estimates(status.person);
+    if (refused > told_refused_)
+      waits += fmt::format("{}{}", waits.empty() ? "" : "; ", person_counts_text(status.person));
+    told_refused_ = refused;
     if (waits.empty()) return;
     said_at_ = status.input.now;
     note(session_, fmt::format("{} ({})", safety_state_name(last_), waits));
@@ -181,7 +185,8 @@ class ArmedRun {
   RunLog& log_;
   ArmingFacts facts_;
   SafetyState last_ = SafetyState::kOffline;
-  double said_at_ = 0.0;  // by the guard's clock [s]
+  double said_at_ = 0.0;   // by the guard's clock [s]
+  long told_refused_ = 0;  // estimates of a person
   bool armed_ = false;
   std::string refusal_;
 };
@@ -361,6 +366,8 @@ void add_hardware(CLI::App& app, Session& session) {
         ->capture_default_str();
   }
   add_play_partner(*hardware, session);
+  add_see(*hardware, session);
+  add_calibrate(*hardware, session);
   add_holds(*hardware, session);
   add_log_commands(*hardware, session);
   arm->add_option("--walker", arguments->walker, "controller that keeps it on its feet (homie, wbc_sim, ...)");

@@ -39,6 +39,11 @@ void add_log_commands(CLI::App& hardware, Session& session);
 // Tells `duet hw status`, where it waits beside the guard's socket, how the guard is: 10 times a second.
 RunLog::Watch status_sender(const std::string& socket);
 
+// `duet hw see`: recorded estimates of a person into guard and policy.
+void add_see(CLI::App& hardware, Session& session);
+// `duet hw calibrate`: the camera on the body from a person at marked places.
+void add_calibrate(CLI::App& hardware, Session& session);
+
 // `duet hw play-partner`: a clip in the place of a camera.
 void add_play_partner(CLI::App& hardware, Session& session);
 

@@ -29,10 +29,12 @@ enum class TwinClock { kInProcess, kLockStep, kRealTime };
 const std::vector<std::string> kClockNames = {"in-process", "lock-step", "real-time"};
 
 struct EpisodesArguments {
-  std::string config, suite, walker, engine = "mujoco", clock = "lock-step", output;
+  std::string config, suite, walker, engine = "mujoco", clock = "lock-step", output, camera, beside = "simulator";
   std::vector<std::string> overrides;
   int limit = 0;
   double noise = 1.0;
+
+  [[nodiscard]] bool beside_clip() const { return beside == "clip"; }
 };
 
 TwinClock parse_clock(const std::string& name) {
@@ -58,6 +60,7 @@ class TwinEpisodes {
       : session_(session),
         arguments_(arguments),
         clock_(parse_clock(arguments.clock)),
+        camera_(parse_twin_camera(arguments.camera)),
         config_(read_robot_config(arguments.config)),
         experiment_(read_suite(arguments)),
         walker_(arguments.walker.empty() ? experiment_.suite().controllers.front()
@@ -104,14 +107,16 @@ class TwinEpisodes {
   void say_first() const {
     note(session_,
          fmt::format(
-             "rolls out each episode of {} {} twice under '{}': in {}, and over a twin with {} behind it ({}, "
+             "rolls out each episode of {} {} twice under '{}': {}, and over a twin with {} behind it ({}, "
              "domain {}), behind the guard of '{}' whose log goes to '{}'. The twin is armed by this program; a "
              "robot cannot be.",
-             experiment_.suite().name, experiment_.suite().version, walker_.name, arguments_.engine, arguments_.engine,
-             arguments_.clock, config_.permission.domain, arguments_.config, arguments_.output));
+             experiment_.suite().name, experiment_.suite().version, walker_.name,
+             arguments_.beside_clip() ? "over a twin with the clip's partner before the policy's eyes"
+                                      : "in " + arguments_.engine,
+             arguments_.engine, arguments_.clock, config_.permission.domain, arguments_.config, arguments_.output));
   }
 
-  [[nodiscard]] std::string path(int index, const char* ending) const {
+  [[nodiscard]] std::string path(int index, const std::string& ending) const {
     return (std::filesystem::path(arguments_.output) / fmt::format("episode-{:03d}{}", index, ending)).string();
   }
 
@@ -130,16 +135,20 @@ class TwinEpisodes {
     return std::make_unique<TwinOverDds>(options, setup(), std::move(walker), &log);
   }
 
-  GuardedRun run_guarded(const EpisodeSpec& spec, int index) {
+  GuardedRun run_guarded(const EpisodeSpec& spec, int index, bool sees_clip) {
     std::unique_ptr<Walker> walker = make_walker_();
     GuardedOptions options;
     options.config = config_;
     options.steps_from = walker->steps_from();
     options.engine = fmt::format("twin-{}", arguments_.engine);
-    options.recording = path(index, ".npz");
+    options.camera = camera_;
+    options.camera.seed = spec.seed;
+    options.policy_sees_clip = sees_clip;
+    const std::string which = sees_clip ? "-clip" : "";
+    options.recording = path(index, which + ".npz");
     options.stop_asked = [] { return interrupt() != Interrupt::kNone; };
-    std::filesystem::remove(path(index, ".mcap"));
-    RunLog log(path(index, ".mcap"), setup());
+    std::filesystem::remove(path(index, which + ".mcap"));
+    RunLog log(path(index, which + ".mcap"), setup());
     const std::unique_ptr<GuardLink> link = make_link(spec, std::move(walker), log);
     GuardedRun run = run_guarded_episode(experiment_, spec, *link, options);
     dropped_ += log.dropped();
@@ -147,27 +156,34 @@ class TwinEpisodes {
   }
 
   void run_both(const EpisodeSpec& spec, int index) {
-    const EpisodeRow simulated = experiment_.run(spec);
-    const GuardedRun guarded = run_guarded(spec, index);
-    if (guarded.interrupted) throw EpisodeInterrupted();
-    keep(simulated);
+    const GuardedRun other = arguments_.beside_clip() ? run_guarded(spec, index, true) : GuardedRun{};
+    const EpisodeRow simulated = arguments_.beside_clip() ? other.row : experiment_.run(spec);
+    const GuardedRun guarded = run_guarded(spec, index, false);
+    if (guarded.interrupted || other.interrupted) throw EpisodeInterrupted();
+    if (!arguments_.beside_clip()) keep(simulated);  // two rows of one episode have one key
     keep(guarded.row);
     episodes_.simulated.push_back(simulated);
     episodes_.guarded.push_back(guarded.row);
     runs_.push_back(guarded);
     note(session_,
-         fmt::format("{:3d} {:<10} {:<8} simulator {} {}; twin {} {}{}; held {} ticks, {} reports missed, {:.1f} s in "
-                     "{:.1f} s",
-                     index, guarded.row.task, guarded.row.policy, to_string(simulated.outcome),
-                     simulated.success.value_or(false) ? "success" : "-", to_string(guarded.row.outcome),
+         fmt::format("{:3d} {:<10} {:<8} {} {} {}; {} {} {}{}; held {} ticks, {} reports missed, nobody tracked in {}, "
+                     "{:.1f} s in {:.1f} s",
+                     index, guarded.row.task, guarded.row.policy, names().first, to_string(simulated.outcome),
+                     simulated.success.value_or(false) ? "success" : "-", names().second,
+                     to_string(guarded.row.outcome),
                      guarded.row.success.value_or(false) ? "success" : "-",
                      guarded.row.message.empty() ? "" : " (" + guarded.row.message + ")", guarded.held_ticks,
-                     guarded.missed_reports, guarded.guard_seconds, guarded.row.wall_s));
+                     guarded.missed_reports, guarded.unseen_ticks, guarded.guard_seconds, guarded.row.wall_s));
   }
 
   // Nothing that is finished is lost; a row that the folder has from before stands.
   void keep(const EpisodeRow& row) {
     if (rows_->claim(row.key) == Claim::kMine) rows_->append(row);
+  }
+
+  [[nodiscard]] std::pair<std::string, std::string> names() const {
+    if (arguments_.beside_clip()) return {"clip's partner", "tracked person"};
+    return {"simulator", "twin"};
   }
 
   [[nodiscard]] std::string by_task() const {
@@ -180,7 +196,8 @@ class TwinEpisodes {
     }
     std::string text;
     for (const auto& [task, count] : counts)
-      text += fmt::format("  {:<10} simulator {} of {}, twin {} of {}\n", task, count[1], count[0], count[2], count[0]);
+      text += fmt::format("  {:<10} {} {} of {}, {} {} of {}\n", task, names().first, count[1], count[0],
+                          names().second, count[2], count[0]);
     return text;
   }
 
@@ -210,7 +227,7 @@ class TwinEpisodes {
         "{}\n{}executed of the reference: {}\nclamps of the guard (its ticks): {}\n{:.1f} s of episodes in {:.1f} s of "
         "wall time with the wait for the guard ({}); held {} of the planner's ticks, {} reports missed, {} ticks left "
         "out of logs",
-        paired_text(success, "simulator", "twin"), by_task(), executed, clamp_totals(), guard_seconds, wall,
+        paired_text(success, names().first, names().second), by_task(), executed, clamp_totals(), guard_seconds, wall,
         arguments_.clock, held, missed, dropped_);
     nlohmann::json json = paired_json(success);
     json["clock"] = arguments_.clock;
@@ -225,6 +242,7 @@ class TwinEpisodes {
   Session& session_;
   const EpisodesArguments& arguments_;
   TwinClock clock_;
+  TwinCamera camera_;
   RobotConfig config_;
   Experiment experiment_;
   std::optional<RunDirectory> rows_;  // the output folder: a run that `duet report` reads
@@ -285,6 +303,13 @@ void add_hardware_episodes(CLI::App& hardware, Session& session) {
   command->add_option("--noise", arguments->noise, "of the twin's sensors, as a share of the usual")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 100.0));
+  command->add_option("--camera", arguments->camera,
+                      "what the twin's camera gets wrong: noise=0.02,latency=0.1,unseen=0.05,jumps=0.01 [m, s, shares]");
+  command->add_option("--beside", arguments->beside,
+                      "what the twin is compared with: the simulator, or the twin with a policy that sees the clip's "
+                      "partner (clip) and not the one who is tracked")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"simulator", "clip"}));
   command->add_option("-n,--limit", arguments->limit, "most episodes; 0: all")->check(CLI::Range(0, 1000000));
   command->add_option("-s,--set", arguments->overrides, "key=value of the suite")->allow_extra_args(false);
   command->callback([&session, arguments] {
@@ -304,6 +329,12 @@ void add_clip_options(CLI::App& command, ClipEpisodeArguments& arguments) {
   command.add_option("--recording", arguments.recording, "recording to make (NPZ)");
 }
 
+std::string seen_text(const RobotConfig& config) {
+  if (config.has_camera) return "the person whom the guard's camera tracks";
+  return config.twin ? "the clip's partner as the guard tracks them"
+                     : "the clip's partner: the configuration has no 'camera'";
+}
+
 void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, const std::string& socket) {
   if (arguments.config.empty()) throw InputError("--clip: expected the configuration too (--config), found none");
   const RobotConfig config = read_robot_config(arguments.config);
@@ -316,12 +347,13 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
        fmt::format(
            "asks the guard at '{}' for {:.1f} s of '{}' ({}, policy '{}', start {}): the robot's arms follow the "
            "reference, its root goes at most {:.2f} m/s. The guard limits it and keeps the log; afterwards the "
-           "robot is told to stand.",
+           "robot is told to stand. The policy sees {}.",
            socket, episode_ticks(setup) / kTickRate, spec.clip->clip_id, to_string(spec.clip->task), arguments.policy,
-           arguments.start, config.limits.forward));
+           arguments.start, config.limits.forward, seen_text(config)));
   SocketGuardLink link(socket);
   GuardedOptions options;
   options.config = config;
+  options.own_camera = config.has_camera;
   options.steps_from = least_step_speed(arguments.walker);
   options.engine = config.twin ? "twin" : "robot";
   options.recording = arguments.recording;
@@ -332,10 +364,10 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
   };
   const GuardedRun run = run_guarded_episode(experiment, spec, link, options);
   print(session,
-        fmt::format("{}{}; success: {}; {:.1f} s; held {} ticks, {} reports missed; executed: {}",
+        fmt::format("{}{}; success: {}; {:.1f} s; held {} ticks, {} reports missed, nobody tracked in {}; executed: {}",
                     to_string(run.row.outcome), run.row.message.empty() ? "" : " (" + run.row.message + ")",
                     run.row.success.value_or(false) ? "yes" : "no", run.guard_seconds, run.held_ticks,
-                    run.missed_reports, executed_mask_text(run.executed, *experiment.bodies().nominal())),
+                    run.missed_reports, run.unseen_ticks, executed_mask_text(run.executed, *experiment.bodies().nominal())),
         to_json(run.row));
   if (run.row.outcome == Outcome::kError) session.exit_code = kExitErrors;
 }

@@ -66,7 +66,8 @@ std::string real_time_text() {
 
 nlohmann::json status_json(const RobotGuard& guard) {
   const GuardStatus& status = guard.status();
-  nlohmann::json clamps = nlohmann::json::object();
+  nlohmann::json clamps = nlohmann::json::object(), estimates = nlohmann::json::object();
+  for (std::size_t k = 0; k < kPersonFaults; ++k) estimates[estimate_name(k)] = status.person[k];
   for (std::size_t k = 0; k < kClampReasons; ++k) clamps[std::string(kClampNames[k])] = status.clamps[k];
   return {{"state", safety_state_name(status.safety.state)},
           {"cause", stop_cause_name(status.safety.cause)},
@@ -77,20 +78,22 @@ nlohmann::json status_json(const RobotGuard& guard) {
           {"number_faults", status.number_faults},
           {"old_messages", status.old_messages},
           {"restarts", status.restarts},
+          {"estimates", estimates},
           {"clamps", clamps}};
 }
 
 std::string status_text(const RobotGuard& guard, double seconds) {
   const GuardStatus& status = guard.status();
   const RobotHealth& health = status.input.health;
+  const std::string estimates = person_counts_text(status.person);
   return fmt::format(
       "{}\n  {} states in {:.1f} s; {} with a wrong checksum, {} old, {} not finite\n  tilt {:.3f} rad, hottest casing "
-      "{:.0f} and winding {:.0f} degrees C, charge {:.0f} %, remote control {}\n  other writers of commands: {}\n  "
+      "{:.0f} and winding {:.0f} degrees C, charge {:.0f} %, remote control {}\n  other writers of commands: {}{}\n  "
       "clamps: {}{}",
       readiness(guard), status.states, seconds, status.checksum_faults, status.tick_faults, status.number_faults,
       health.tilt, health.casing, health.winding, health.charge,
       status.input.remote_at == kNever ? "not heard" : "heard, " + keys_text(guard.reading().remote),
-      status.input.foreign_writer ? "yes" : "none", clamp_text(status.clamps), reading_text(guard));
+      status.input.foreign_writer ? "yes" : "none", estimates.empty() ? "" : "\n  person: " + estimates, clamp_text(status.clamps), reading_text(guard));
 }
 
 namespace {
@@ -135,7 +138,7 @@ void run_play_partner(Session& session, const PlayArguments& arguments) {
   for (std::uint64_t round = 0; goes_on && (round == 0 || arguments.again); ++round) {
     PersonPlay play = arguments.play;
     play.seed += round;
-    PersonPlayer player(clip.actor_motion(), X_WB, config.X_BC, play);
+    PersonPlayer player(clip.actor_motion(), X_WB, config.camera.X_BC, play);
     goes_on = play_once(player, play.rate, guard, sent, sequence);
   }
   print(session, fmt::format("{} estimates sent", sent), {{"sent", sent}});
@@ -154,6 +157,9 @@ void add_play_partner(CLI::App& hardware, Session& session) {
       ->capture_default_str()
       ->check(CLI::Range(1.0, 1000.0));
   command->add_option("--noise", arguments->play.noise, "on each axis of each joint [m]")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--latency", arguments->play.latency, "from a picture to its message, which says so [s]")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1.0));
   command->add_option("--unseen", arguments->play.unseen, "share of estimates in which nobody is seen")

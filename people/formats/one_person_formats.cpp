@@ -10,6 +10,7 @@
 #include "duet/core/require.h"
 #include "duet/people/body_people.h"
 #include "duet/people/people_format.h"
+#include "duet/people/video_person.h"
 
 namespace duet {
 namespace {
@@ -126,7 +127,7 @@ const PeopleFormat& amass_format() {
 namespace {
 
 constexpr double kGvhmrRate = 30.0;
-constexpr std::string_view kGvhmrKey = "smpl_params_global";
+constexpr std::string_view kGvhmrKey = "smpl_params_global", kGvhmrCameraKey = "smpl_params_incam";
 
 bool is_torch_name(const std::string& name) { return name.ends_with(".pt"); }
 
@@ -144,18 +145,18 @@ std::vector<ClipPlace> find_gvhmr(std::span<const std::string> paths, const Peop
   return pairs_at(paths, is_torch_name, "GVHMR");
 }
 
-BodyMotion read_gvhmr_person(const std::string& path) {
+BodyMotion gvhmr_motion(const std::string& path, std::string_view gvhmr_key) {
   const TorchFile file = parse_torch(read_data(path), path);
   const Pickle& pickle = file.pickle;
-  const PickleNode* parameters = pickle.find(pickle[pickle.root], kGvhmrKey);
+  const PickleNode* parameters = pickle.find(pickle[pickle.root], gvhmr_key);
   if (parameters == nullptr || parameters->kind != PickleKind::kDict)
     throw InputError(fmt::format("'{}': expected a dict with the key '{}' (GVHMR's hmr4d_results.pt), found {}",
-                                 excerpt(path), kGvhmrKey,
+                                 excerpt(path), gvhmr_key,
                                  parameters == nullptr ? "none" : to_string(parameters->kind)));
   const auto table = [&](const std::string& key) {
     const PickleNode* node = pickle.find(*parameters, key);
-    if (node == nullptr) throw InputError(fmt::format("'{}': no '{}' in '{}'", excerpt(path), key, kGvhmrKey));
-    return table_of(file, *node, fmt::format("'{}' of '{}'", key, kGvhmrKey));
+    if (node == nullptr) throw InputError(fmt::format("'{}': no '{}' in '{}'", excerpt(path), key, gvhmr_key));
+    return table_of(file, *node, fmt::format("'{}' of '{}'", key, gvhmr_key));
   };
   BodyMotion motion = body_motion(path, table("global_orient"), table("body_pose"), table("transl"));
   if (pickle.find(*parameters, "betas") != nullptr) motion.betas = mean_betas(table("betas"));
@@ -171,13 +172,27 @@ RawPeople read_gvhmr(const ClipPlace& place, const PeopleOptions& options) {
   add_people(raw,
              {.format = "gvhmr",
               .licence = "",
-              .people = {read_gvhmr_person(place.files[0]), read_gvhmr_person(place.files[1])},
+              .people = {gvhmr_motion(place.files[0], kGvhmrKey), gvhmr_motion(place.files[1], kGvhmrKey)},
               .apart = true},
              options);
   return raw;
 }
 
 }  // namespace
+
+bool is_torch_person(const std::string& path) { return is_torch_file(path); }
+
+VideoPerson read_gvhmr_person(const std::string& path, const VideoPersonOptions& options) {
+  BodyMotion motion = gvhmr_motion(path, kGvhmrCameraKey);
+  for (Eigen::Vector3d& place : motion.translation) place.z() *= options.depth_scale;
+  const PointTracks joints =
+      pose_motion(motion, options.body_model.empty() ? average_body() : load_body_model(options.body_model));
+  return {.format = "gvhmr",
+          .rate_hz = options.rate_hz.value_or(kGvhmrRate),
+          .joints = joints,
+          .seen = std::vector<bool>(static_cast<std::size_t>(joints.frames()), true),
+          .evidence = fmt::format("GVHMR, {}: {} frames", kGvhmrCameraKey, joints.frames())};
+}
 
 const PeopleFormat& gvhmr_format() {
   static const PeopleFormat format{.name = "gvhmr",

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "duet/archives/pickle/pickle_files.h"
@@ -13,6 +15,7 @@
 #include "duet/people/bodies/body_model.h"
 #include "duet/people/body_people.h"
 #include "duet/people/people_format.h"
+#include "duet/people/video_person.h"
 
 namespace duet {
 namespace {
@@ -231,14 +234,15 @@ Eigen::Quaterniond rotation_of_matrix(const NumberTable& table, std::size_t whic
   return q;
 }
 
+// The person at those frames of the video, in all of which they are there.
 BodyMotion phalp_motion(const Pickle& pickle, const std::vector<PhalpFrame>& frames, const Track& track,
-                        const Stretch& stretch) {
+                        std::span<const std::int64_t> numbers) {
   BodyMotion motion{.file = pickle.name};
-  motion.local.assign(static_cast<std::size_t>(stretch.frames) * kSmplJoints, Eigen::Quaterniond::Identity());
+  motion.local.assign(numbers.size() * kSmplJoints, Eigen::Quaterniond::Identity());
   std::vector<double> sum;
-  for (int t = 0; t < stretch.frames; ++t) {
-    const PhalpFrame& frame = frames[static_cast<std::size_t>(stretch.begin) + t];
-    const auto place = static_cast<std::size_t>(track.rows.at(stretch.begin + t));
+  for (std::size_t t = 0; t < numbers.size(); ++t) {
+    const PhalpFrame& frame = frames[static_cast<std::size_t>(numbers[t])];
+    const auto place = static_cast<std::size_t>(track.rows.at(numbers[t]));
     const PickleNode& smpl = pickle[frame.smpl->items[place]];
     const NumberTable root = table_of(pickle, dict_value(pickle, smpl, "global_orient"), "'global_orient'");
     const NumberTable body = table_of(pickle, dict_value(pickle, smpl, "body_pose"), "'body_pose'");
@@ -246,43 +250,105 @@ BodyMotion phalp_motion(const Pickle& pickle, const std::vector<PhalpFrame>& fra
     if (root.values.size() != 9) root.fail(fmt::format("expected shape (1, 3, 3), found {}", root.found()));
     if (body.values.size() != 23 * 9) body.fail(fmt::format("expected shape (23, 3, 3), found {}", body.found()));
     if (camera.values.size() != 3) camera.fail(fmt::format("expected shape (3,), found {}", camera.found()));
-    Eigen::Quaterniond* local = &motion.local[static_cast<std::size_t>(t) * kSmplJoints];
+    Eigen::Quaterniond* local = &motion.local[t * kSmplJoints];
     local[kPelvis] = rotation_of_matrix(root, 0);
     for (std::size_t j = 1; j < kSmplJoints; ++j) local[j] = rotation_of_matrix(body, j - 1);
     motion.translation.emplace_back(camera.values[0], camera.values[1], camera.values[2]);
     const std::vector<double> betas = mean_betas(table_of(pickle, dict_value(pickle, smpl, "betas"), "'betas'"));
     sum.resize(std::max(sum.size(), betas.size()));
-    for (std::size_t b = 0; b < betas.size(); ++b) sum[b] += betas[b] / stretch.frames;
+    for (std::size_t b = 0; b < betas.size(); ++b) sum[b] += betas[b] / static_cast<double>(numbers.size());
   }
   motion.betas = std::move(sum);
   return motion;
 }
 
-RawPeople read_phalp(const ClipPlace& place, const PeopleOptions& options) {
-  const std::string bytes = read_data(place.files[0]);
-  const Pickle pickle = parse_joblib(bytes, place.files[0]);
+std::vector<Track> phalp_tracks(const Pickle& pickle, std::vector<PhalpFrame>& frames) {
   const PickleNode& root = pickle[pickle.root];
   if (root.kind != PickleKind::kDict)
     pickle.fail(root.offset, fmt::format("expected a dict of frames, found {}", to_string(root.kind)));
   std::vector<Track> tracks;
-  std::vector<PhalpFrame> frames;
   for (std::size_t i = 0; i + 1 < root.items.size(); i += 2)
     add_phalp_frame(pickle, pickle[root.items[i + 1]], static_cast<std::int64_t>(i / 2), tracks, frames);
+  return tracks;
+}
+
+RawPeople read_phalp(const ClipPlace& place, const PeopleOptions& options) {
+  const std::string bytes = read_data(place.files[0]);
+  const Pickle pickle = parse_joblib(bytes, place.files[0]);
+  std::vector<PhalpFrame> frames;
+  const std::vector<Track> tracks = phalp_tracks(pickle, frames);
   RawPeople raw = video_people(place);
   raw.evidence.emplace_back("layout: 4D-Humans (PHALP), rotation matrices in the camera's frame; depths are guesses");
   raw.evidence.emplace_back("rate: 30 Hz, as most videos (the file does not say; state the rate where it is another)");
   const Stretch stretch = longest_stretch(pickle.name, tracks, raw.evidence);
+  std::vector<std::int64_t> numbers(static_cast<std::size_t>(stretch.frames));
+  std::iota(numbers.begin(), numbers.end(), stretch.begin);
   add_people(raw,
              {.format = "4d-humans",
               .licence = "",
-              .people = {phalp_motion(pickle, frames, tracks[stretch.a], stretch),
-                         phalp_motion(pickle, frames, tracks[stretch.b], stretch)},
+              .people = {phalp_motion(pickle, frames, tracks[stretch.a], numbers),
+                         phalp_motion(pickle, frames, tracks[stretch.b], numbers)},
               .apart = true},
              options);
   return raw;
 }
 
+// The pelvis' mean distance along the camera's axis, by the numbers of the file.
+double phalp_depth(const Pickle& pickle, const std::vector<PhalpFrame>& frames, const Track& track) {
+  double sum = 0.0;
+  for (const auto& [number, place] : track.rows) {
+    const PickleNode& camera =
+        pickle[frames[static_cast<std::size_t>(number)].camera->items[static_cast<std::size_t>(place)]];
+    const NumberTable values = table_of(pickle, camera, "'camera'");
+    if (values.values.size() != 3) values.fail(fmt::format("expected shape (3,), found {}", values.found()));
+    sum += values.values[2];
+  }
+  return sum / static_cast<double>(track.rows.size());
+}
+
 }  // namespace
+
+VideoPerson read_phalp_person(const std::string& path, const VideoPersonOptions& options) {
+  const std::string bytes = read_data(path);
+  const Pickle pickle = parse_joblib(bytes, path);
+  std::vector<PhalpFrame> frames;
+  const std::vector<Track> tracks = phalp_tracks(pickle, frames);
+  if (tracks.empty()) throw InputError(fmt::format("'{}': expected a person, found nobody", excerpt(path)));
+  const Track* best = nullptr;
+  for (const Track& track : tracks)
+    if (best == nullptr || track.rows.size() > best->rows.size() ||
+        (track.rows.size() == best->rows.size() &&
+         phalp_depth(pickle, frames, track) < phalp_depth(pickle, frames, *best)))
+      best = &track;
+  std::vector<std::int64_t> numbers;
+  for (const auto& [number, place] : best->rows) numbers.push_back(number);
+  BodyMotion motion = phalp_motion(pickle, frames, *best, numbers);
+  for (Eigen::Vector3d& place : motion.translation) place.z() *= options.depth_scale;
+  VideoPerson person{.format = "4d-humans",
+                     .rate_hz = options.rate_hz.value_or(kVideoRate),
+                     .joints = PointTracks(static_cast<int>(frames.size()), kSmplJoints),
+                     .seen = std::vector<bool>(frames.size(), false),
+                     .evidence = fmt::format("4D-Humans (PHALP): track {} of {}, seen in {} of {} frames", best->id,
+                                             tracks.size(), numbers.size(), frames.size())};
+  const PointTracks posed =
+      pose_motion(motion, options.body_model.empty() ? average_body() : load_body_model(options.body_model));
+  for (std::size_t t = 0; t < numbers.size(); ++t) {
+    person.joints.frame(static_cast<int>(numbers[t])) = posed.frame(static_cast<int>(t));
+    person.seen[static_cast<std::size_t>(numbers[t])] = true;
+  }
+  return person;
+}
+
+bool is_video_person(const std::string& path) {
+  return (path.ends_with(".pkl") && is_phalp_file(path)) || (path.ends_with(".pt") && is_torch_person(path));
+}
+
+VideoPerson read_video_person(const std::string& path, const VideoPersonOptions& options) {
+  if (path.ends_with(".pkl") && is_phalp_file(path)) return read_phalp_person(path, options);
+  if (path.ends_with(".pt") && is_torch_person(path)) return read_gvhmr_person(path, options);
+  throw InputError(fmt::format("'{}': expected a file of 4D-Humans with PHALP (.pkl) or GVHMR (.pt), found another",
+                               excerpt(path)));
+}
 
 const PeopleFormat& wham_format() {
   static const PeopleFormat format{.name = "wham",

@@ -9,6 +9,7 @@
 #include "duet/people/formats/inter/inter_x.h"
 #include "duet/people/hdf5/hdf5.h"
 #include "duet/people/people_format.h"
+#include "duet/people/video_person.h"
 #include "tests/fuzz/archive_edit.h"
 #include "tests/fuzz/reader.h"
 #include "tests/people/body_files.h"
@@ -74,8 +75,16 @@ void read_interhuman_file(std::string_view bytes) { read_people(interhuman_raw_f
 std::string motion_x_sample(unsigned /*seed*/) { return test::motion_x_npy(fuzz_body(0.3)); }
 void read_motion_x_file(std::string_view bytes) { read_people(motion_x_format(), "a.npy", bytes); }
 
-std::string gvhmr_sample(unsigned /*seed*/) { return test::gvhmr_pt(fuzz_body(0.3)); }
-void read_gvhmr_file(std::string_view bytes) { read_people(gvhmr_format(), "a.pt", bytes); }
+// The world's people, or the camera's person.
+std::string gvhmr_sample(unsigned seed) {
+  return test::gvhmr_pt(fuzz_body(0.3), seed % 2 == 0 ? "smpl_params_global" : "smpl_params_incam");
+}
+void read_gvhmr_file(std::string_view bytes) {
+  if (bytes.find("smpl_params_incam") != std::string_view::npos)
+    (void)read_gvhmr_person(scratch_file("a.pt", bytes), {});
+  else
+    read_people(gvhmr_format(), "a.pt", bytes);
+}
 
 std::string wham_sample(unsigned /*seed*/) {
   return test::wham_pkl({{0, 0, fuzz_body(0.3, 23)}, {1, 1, fuzz_body(1.2, 23)}});
@@ -85,7 +94,10 @@ void read_wham_file(std::string_view bytes) { read_people(wham_format(), "wham_o
 std::string phalp_sample(unsigned /*seed*/) {
   return test::phalp_pkl({{1, 0, fuzz_body(0.3, 23)}, {2, 0, fuzz_body(1.2, 23)}}, 3);
 }
-void read_phalp_file(std::string_view bytes) { read_people(four_d_humans_format(), "video.pkl", bytes); }
+void read_phalp_file(std::string_view bytes) {
+  (void)read_phalp_person(scratch_file("video.pkl", bytes), {});
+  read_people(four_d_humans_format(), "video.pkl", bytes);
+}
 
 std::string body_model_sample(unsigned seed) {
   const test::SmallModel small(24);

@@ -7,7 +7,7 @@
 #include "duet/core/require.h"
 #include "duet/hardware/executors/sport_executor.h"
 #include "duet/hardware/guard/guard_message.h"
-#include "duet/hardware/guard/person_input.h"
+#include "duet/hardware/guard/person_log.h"
 #include "duet/hardware/guard/robot_connection.h"
 #include "duet/hardware/log/guard_health.h"
 #include "duet/hardware/log/limiter_replay.h"
@@ -77,18 +77,32 @@ std::string person_sample(unsigned seed) {
   PersonEstimate estimate;
   estimate.sequence = seed;
   estimate.seen = seed / 64 % 2 == 0;
+  estimate.latency = 0.01 * (seed % 20);
   for (int j = 0; j < kSmplJoints; ++j) estimate.joints.col(j) = Eigen::Vector3d(0.01 * j, -0.02 * j, 3.0);
   PersonBuffer buffer;
   encode(estimate, buffer);
-  return text_of(buffer, buffer.size());
+  if (seed % 3 > 0) return text_of(buffer, buffer.size());
+  std::string first = text_of(buffer, kFirstPersonBytes);  // of the form of before, and one of today's behind it
+  first[3] = '1';
+  return first + text_of(buffer, buffer.size());
 }
 
 void read_person(std::string_view bytes) {
   PersonEstimate estimate;
-  refuse_unless(decode(datagram(bytes), estimate) == PersonFault::kNone);
-  PersonTrack track(Pose{});
-  (void)track.receive(estimate, {}, 1.0);
-  (void)track.at(1.1);
+  PersonPlacer placer({});
+  PersonMessage message;
+  PersonTrack track;
+  placer.base({}, 1.0);
+  bool taken = false;
+  for (const RecordedEstimate& one : parse_person_log(bytes, "x")) {
+    if (decode(datagram(one.bytes), estimate) != PersonFault::kNone) continue;
+    taken = true;
+    const double now = 1.0 + one.at;
+    if (placer.place(estimate, now, message) != PersonFault::kNone) continue;
+    track.add(message.joints, now - message.latency, now);
+    (void)track.at(now + 0.05, message.joints);
+  }
+  refuse_unless(taken);
 }
 
 std::string external_sample(unsigned seed) {

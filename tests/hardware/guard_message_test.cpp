@@ -37,7 +37,7 @@ TEST(GuardMessage, APlannersCommandIsReadAsItWasSent) {
 }
 
 TEST(GuardMessage, APersonIsReadAsItWasSent) {
-  PersonMessage person{.sequence = 9};
+  PersonMessage person{.sequence = 9, .latency = 0.08};
   for (int j = 0; j < 24; ++j) person.joints.col(j) = Eigen::Vector3d(j, -j, 0.5 * j);
   GuardBuffer buffer;
   const std::size_t size = encode(person, buffer);
@@ -45,6 +45,7 @@ TEST(GuardMessage, APersonIsReadAsItWasSent) {
   ASSERT_EQ(decode(first(buffer, size), read), GuardMessageKind::kPerson);
   EXPECT_EQ(read.person.joints, person.joints);
   EXPECT_EQ(read.person.sequence, 9u);
+  EXPECT_EQ(read.person.latency, 0.08);
 }
 
 TEST(GuardMessage, AStopIsAStop) {

@@ -41,6 +41,20 @@ TEST(GuardReport, ArrivesAsItWasSent) {
   EXPECT_NEAR(read.root.forward, 0.1, 1e-6);
   EXPECT_EQ(read.clamps, sent.clamps);
   EXPECT_TRUE(read.odometry);
+  EXPECT_TRUE(read.tracked);
+  EXPECT_EQ(read.person, sent.person);
+  EXPECT_EQ(read.person, test::standing_adult({4.0, 0.0, 0.95}));
+}
+
+TEST(GuardReport, APersonWhoIsLostIsNotTrackedAnyMore) {
+  GuardedTwin robot;
+  robot.start();
+  EXPECT_TRUE(report_of(robot.guard).tracked);
+  robot.sees = false;
+  robot.run_for(0.24);
+  EXPECT_TRUE(report_of(robot.guard).tracked);
+  robot.run_for(0.1);
+  EXPECT_FALSE(report_of(robot.guard).tracked);
 }
 
 TEST(GuardReport, WhatIsNoReportIsRefused) {

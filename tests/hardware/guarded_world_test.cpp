@@ -1,6 +1,7 @@
 // An episode behind the guard: the same loop as in an engine, and every way in which the guard ends it is an outcome.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <limits>
 
@@ -192,12 +193,12 @@ TEST(GuardedWorld, ThePersonIsSeenThirtyTimesASecondWhereTheClipHasThem) {
   PointTracks partner(200, 24);
   for (int t = 0; t < 200; ++t) partner.frame(t) = test::standing_adult({4.0 + 0.001 * t, 0.0, 0.95});
   const PartnerSource source = partner_of_clip(partner);
-  HumanJoints joints;
+  PersonMessage estimate;
   int seen = 0;
   for (int tick = 0; tick < 50; ++tick) {
-    if (!source(tick, joints)) continue;
+    if (!source(tick, estimate)) continue;
     ++seen;
-    EXPECT_EQ(joints, partner.frame(tick));
+    EXPECT_EQ(estimate.joints, partner.frame(tick));
   }
   EXPECT_EQ(seen, 30);
   GuardedEpisode episode = guarded();
@@ -206,6 +207,119 @@ TEST(GuardedWorld, ThePersonIsSeenThirtyTimesASecondWhereTheClipHasThem) {
   const Rollout rollout = behind.roll(3.0, 0.3);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
   EXPECT_EQ(behind.link.guard().status().bad_messages, 0);
+}
+
+// What the policy is shown, by tick.
+class WatchingReference final : public ReferenceSource {
+ public:
+  void begin(const RobotState& start) override { reference_ = {start.X_WB, start.q}; }
+  const Reference* at(const TickView& present) override {
+    shown.push_back(*present.partner);
+    return &reference_;
+  }
+  std::vector<HumanJoints> shown;
+
+ private:
+  Reference reference_;
+};
+
+// Somebody who walks up at 0.5 m/s; the episode's own partner stands elsewhere.
+struct Watched {
+  explicit Watched(const TwinCamera& camera, GuardedEpisode episode = guarded(), double seconds = 3.0) {
+    PointTracks walks(300, 24);
+    for (int t = 0; t < 300; ++t) walks.frame(t) = place(t);
+    episode.person = partner_of_clip(walks, camera);
+    episode.perceives = true;
+    Behind behind(test::twin_guard(), episode);
+    Episode of_clip = episode_of(seconds, {yaw_rotation(1.0), {3.0, -2.0, 0.0}});
+    of_clip.partner = PointTracks(of_clip.ticks + 1, kSmplJoints);
+    rollout = roll_out(of_clip, behind.world, source, "twin");
+    unseen_ticks = behind.world.unseen_ticks();
+    counts = behind.link.guard().status().person;
+  }
+  static HumanJoints place(int tick) {
+    return test::standing_adult({7.0 - 0.01 * std::clamp(tick, 0, 299), -2.0, 0.95});
+  }
+  WatchingReference source;
+  Rollout rollout;
+  int unseen_ticks = 0;
+  PersonCounts counts{};
+};
+
+// In the episode's own frame, as late as the estimates are and the track looks back: 40 ms, or 140 with a camera of 100.
+TEST(GuardedWorld, ThePolicySeesThePersonWhomTheGuardTracks) {
+  for (const double latency : {0.0, 0.1}) {
+    const Watched watched({.latency = latency});
+    ASSERT_EQ(watched.rollout.recording.outcome, Outcome::kOk) << watched.rollout.recording.message;
+    ASSERT_EQ(watched.source.shown.size(), 150u);
+    EXPECT_EQ(watched.unseen_ticks, 0);
+    const double behind = 1.0 / 50.0 + 0.04 + latency;  // the report is of the tick before
+    for (int tick = 20; tick < 150; ++tick) {
+      const double x = 7.0 - 0.5 * (0.02 * tick - behind);
+      // The wire's numbers of odometry are short, and the twin creeps as it stands: some millimetres.
+      EXPECT_NEAR(watched.source.shown[static_cast<std::size_t>(tick)](0, 0), x, 0.012) << tick;
+      EXPECT_NEAR(watched.source.shown[static_cast<std::size_t>(tick)](1, 0), -2.0, 0.012) << tick;
+    }
+    // Scores go by where the person was.
+    EXPECT_EQ(watched.rollout.recording.partner.frame(100), HumanJoints(HumanJoints::Zero()));
+  }
+}
+
+TEST(GuardedWorld, GapsAndJumpsOfTheCameraReachThePolicyAsAPersonWhoStays) {
+  for (const TwinCamera& camera : {TwinCamera{.jumps = 0.1, .seed = 5}, TwinCamera{.unseen = 0.3, .seed = 5}}) {
+    const Watched watched(camera);
+    ASSERT_EQ(watched.rollout.recording.outcome, Outcome::kOk);
+    EXPECT_EQ(watched.counts[static_cast<std::size_t>(PersonFault::kJump)] > 0, camera.jumps > 0.0);
+    for (std::size_t tick = 20; tick < 150; ++tick) {
+      const double x = watched.source.shown[tick](0, 0);
+      EXPECT_NEAR(x, 7.0 - 0.5 * (0.02 * static_cast<double>(tick) - 0.06), 0.12) << tick;
+      EXPECT_NEAR(watched.source.shown[tick](1, 0), -2.0, 0.02) << tick << ": nobody jumped";
+    }
+  }
+}
+
+TEST(GuardedWorld, APersonWhoIsLostStaysWhereTheyWereLastSeen) {
+  GuardedEpisode episode = guarded();
+  PointTracks stands(2, 24);
+  stands.frame(0) = stands.frame(1) = Watched::place(0);
+  const PartnerSource source = partner_of_clip(stands);
+  episode.person = [&source](int tick, PersonMessage& seen) { return tick < 50 && source(tick, seen); };
+  episode.perceives = true;
+  Behind behind(test::twin_guard(), episode);
+  WatchingReference policy;
+  Episode of_clip = episode_of(3.0);
+  of_clip.partner = PointTracks(of_clip.ticks + 1, kSmplJoints);
+  const Rollout rollout = roll_out(of_clip, behind.world, policy, "twin");
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk);
+  EXPECT_NEAR(behind.world.unseen_ticks(), 100 - 12, 3);  // a quarter of a second after the last estimate
+  EXPECT_NEAR(policy.shown.back()(0, 0), 7.0, 0.02);
+}
+
+TEST(GuardedWorld, WhereNobodyKnowsBetterTheRecordingHasThePersonWhoWasSeen) {
+  GuardedEpisode episode = guarded();
+  episode.records_seen = true;
+  const Watched watched({}, episode);
+  for (int tick = 0; tick < 150; ++tick)
+    EXPECT_EQ(watched.rollout.recording.partner.frame(tick), watched.source.shown[static_cast<std::size_t>(tick)]);
+}
+
+TEST(GuardedWorld, AnEpisodeDoesNotBeginWithoutAPersonWhoIsTracked) {
+  GuardedEpisode episode = guarded();
+  episode.most_wait = 10.0;
+  episode.perceives = true;
+  Behind behind(test::twin_guard(), episode);
+  EXPECT_SENTENCE(test::thrown_message<std::runtime_error>([&] { (void)behind.roll(1.0); }));
+}
+
+TEST(TwinCamera, IsReadFromItsWords) {
+  const TwinCamera camera = parse_twin_camera("noise=0.02,latency=0.1,unseen=0.05,jumps=0.01");
+  EXPECT_EQ(camera.noise, 0.02);
+  EXPECT_EQ(camera.latency, 0.1);
+  EXPECT_EQ(camera.unseen, 0.05);
+  EXPECT_EQ(camera.jumps, 0.01);
+  EXPECT_EQ(parse_twin_camera("").noise, 0.0);
+  for (const char* text : {"blur=1", "noise", "noise=x", "latency=0.3", "unseen=-0.1", "noise=0.1,"})
+    EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { (void)parse_twin_camera(text); }));
 }
 
 TEST(GuardedWorld, WithoutAPersonWhoHasToBeSeenTheGuardDoesNotRun) {

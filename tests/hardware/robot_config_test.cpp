@@ -60,8 +60,8 @@ TEST(RobotConfig, AWordOfExecutorOdometryAndCameraIsTaken) {
   EXPECT_EQ(config.lcm.hops, 1);
   EXPECT_EQ(config.lcm.group, "239.255.76.68");
   ASSERT_TRUE(config.has_camera);
-  EXPECT_EQ(config.X_BC.p.z(), 0.5);
-  EXPECT_LE((config.X_BC.R * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 1e-12);  // looks ahead
+  EXPECT_EQ(config.camera.X_BC.p.z(), 0.5);
+  EXPECT_LE((config.camera.X_BC.R * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 1e-12);  // looks ahead
   const GuardSetup setup = guard_setup(config, false);
   EXPECT_TRUE(setup.rules.executor_answers && setup.has_battery);
   EXPECT_FALSE(guard_setup(config, true).rules.executor_answers);

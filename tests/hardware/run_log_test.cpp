@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cstring>
 #include <map>
 #include <regex>
@@ -14,6 +15,8 @@
 #include "duet/core/require.h"
 #include "duet/hardware/log/frame_cdr.h"
 #include "duet/hardware/log/limiter_replay.h"
+#include "duet/hardware/log/log_reader.h"
+#include "duet/hardware/log/run_report.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/hardware/logged_twin.h"
 #include "tests/support.h"
@@ -350,6 +353,33 @@ TEST(RunLog, HealthAndLimiterArePlainJsonAsTheirSchemasSay) {
   EXPECT_EQ(counts["guard/setup"], 1);
   EXPECT_EQ(counts["guard/health"], (counts["guard/tick"] + 9) / 10);
   EXPECT_EQ(counts["guard/limiter"], counts["guard/health"]);
+}
+
+// Two kinds of refusals in the first second, one more later: an event for each reason and second.
+TEST(RunLog, RefusedEstimatesAreSaidWithTheirReason) {
+  const test::ScratchFolder folder;
+  {
+    GuardedTwin robot(test::twin_guard(), {});
+    RunLog log(folder / "run.mcap", test::twin_guard());
+    for (int tick = 0; tick < 1500; ++tick) {
+      if (tick == 100 || tick == 1400) robot.guard.note_estimate(PersonFault::kFar);
+      if (tick == 100) robot.guard.note_estimate(PersonFault::kBody);
+      if (tick == 100) robot.guard.note_estimate(PersonFault::kUnseen);
+      robot.tick();
+      log.add(robot.guard);
+    }
+  }
+  std::vector<std::string> said;
+  LogParts parts;
+  parts.event = [&](const LogEvent& event) {
+    if (event.refused > 0) said.push_back(event.why + " " + std::to_string(event.refused));
+  };
+  EXPECT_TRUE(read_run_log(folder / "run.mcap", parts));
+  EXPECT_THAT(said, testing::ElementsAre("far 1", "body 1", "far 1"));
+  const RunReport report = report_of_log(folder / "run.mcap");
+  const auto fault = std::ranges::find(report.faults, "estimates refused: far", &RunReport::Fault::name);
+  ASSERT_NE(fault, report.faults.end());
+  EXPECT_EQ(fault->count, 2);
 }
 
 // A ring that is full while the writer sleeps: the log says where ticks are missing, and how many.

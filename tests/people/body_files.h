@@ -206,11 +206,11 @@ inline std::string motion_x_npy(const BodyParameters& body) { return rows_npy(bo
 inline std::string phuma_npy(const BodyParameters& body) { return rows_npy(body, 69, 3, 6, 0, -1); }
 
 // As GVHMR writes it: the translation lies in memory column by column, betas once a frame.
-inline std::string gvhmr_pt(const BodyParameters& body) {
+inline std::string gvhmr_pt(const BodyParameters& body, const std::string& key = "smpl_params_global") {
   std::vector<double> betas;
   for (int t = 0; t < body.frames; ++t) betas.insert(betas.end(), body.betas.begin(), body.betas.end());
   TorchWriter out;
-  out.pickle.raw("}(").text("smpl_params_global").raw("}(").text("body_pose");
+  out.pickle.raw("}(").text(key).raw("}(").text("body_pose");
   out.floats(body.frames, 63, body.body);
   out.pickle.text("betas");
   out.floats(body.frames, 10, betas);

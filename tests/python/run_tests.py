@@ -17,7 +17,7 @@ def main(package, program, arguments):
         paths.insert(0, os.path.abspath(package))
     os.environ["PYTHONPATH"] = os.pathsep.join(paths)
     os.environ["DUET_PROGRAM"] = os.path.abspath(program)
-    tests = arguments or ["test_evaluate", "test_identity", "test_motion", "test_environment", "test_parallel", "test_package"]
+    tests = arguments or ["test_bridge", "test_evaluate", "test_identity", "test_motion", "test_environment", "test_parallel", "test_package"]
     unittest.main(module=None, argv=["run_tests", *tests], verbosity=2)
 
 
