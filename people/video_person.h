@@ -12,17 +12,17 @@
 namespace duet {
 
 struct VideoPersonOptions {
-  std::string body_model = {};            // path of the user's SMPL, SMPL-H or SMPL-X file
-  std::optional<double> rate_hz = {};     // of the video; none: 30, as most
-  double depth_scale = 1.0;               // of the pelvis: the camera's focal length by the one that the estimator took
+  std::string body_model = {};         // path of the user's SMPL, SMPL-H or SMPL-X file
+  std::optional<double> rate_hz = {};  // of the video; none: 30, as most
+  double depth_scale = 1.0;            // of the pelvis: the camera's focal length by the one that the estimator took
 };
 
 struct VideoPerson {
-  std::string format;        // "4d-humans", "gvhmr"
+  std::string format;  // "4d-humans", "gvhmr"
   double rate_hz = 30.0;
-  PointTracks joints;        // (T, 24) in the camera's frame: x right, y down, z ahead [m]; zero where nobody is seen
-  std::vector<bool> seen;    // T
-  std::string evidence;      // one sentence: what was taken of the file
+  PointTracks joints;      // (T, 24) in the camera's frame: x right, y down, z ahead [m]; zero where nobody is seen
+  std::vector<bool> seen;  // T
+  std::string evidence;    // one sentence: what was taken of the file
 };
 
 // The person who is in the picture for longest; of several the nearest. Throws InputError naming file, place, expected

@@ -172,10 +172,11 @@ TwinCamera parse_twin_camera(const std::string& text) {
                                      [&](const Word& one) { return word.substr(0, equals) == one.name; });
     const std::optional<double> value =
         equals == std::string_view::npos ? std::nullopt : parse_number(word.substr(equals + 1));
-    require(known != std::end(kWords) && value && *value >= 0.0 && *value <= known->most,
-            "a twin's camera: expected noise (to 1 m), latency (to 0.25 s), unseen or jumps (shares to 1) with a value, "
-            "as 'noise=0.02,latency=0.1', found '{}'",
-            excerpt(word));
+    require(
+        known != std::end(kWords) && value && *value >= 0.0 && *value <= known->most,
+        "a twin's camera: expected noise (to 1 m), latency (to 0.25 s), unseen or jumps (shares to 1) with a value, "
+        "as 'noise=0.02,latency=0.1', found '{}'",
+        excerpt(word));
     camera.*known->value = *value;
   }
   return camera;
@@ -236,9 +237,10 @@ void GuardedWorld::wait_for_run(const Pose& start) {
   while (report_.state != SafetyState::kRun || stand_off_ > 0.0 || (episode_.perceives && !report_.tracked)) {
     const bool late = report_.now - asked_at > episode_.most_wait;
     if (late && report_.state == SafetyState::kRun)
-      throw std::runtime_error(fmt::format("{} tracks nobody: an episode begins with a person whom the robot sees; none "
-                                           "was there for {:.1f} s",
-                                           link_.name(), report_.now - asked_at));
+      throw std::runtime_error(
+          fmt::format("{} tracks nobody: an episode begins with a person whom the robot sees; none "
+                      "was there for {:.1f} s",
+                      link_.name(), report_.now - asked_at));
     if (report_.state >= SafetyState::kDamp || late)
       throw std::runtime_error(fmt::format("{} does not run: it is at {} after {:.1f} s", link_.name(),
                                            place_of(report_), report_.now - asked_at));

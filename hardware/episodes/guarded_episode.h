@@ -77,7 +77,7 @@ class GuardedWorld final : public World {
 
   // Counts over the episode's ticks.
   [[nodiscard]] int unseen_ticks() const { return unseen_ticks_; }  // nobody was tracked
-  [[nodiscard]] int held_ticks() const { return held_ticks_; }  // the guard held
+  [[nodiscard]] int held_ticks() const { return held_ticks_; }      // the guard held
   [[nodiscard]] const ClampCounts& clamps() const { return clamps_; }
   [[nodiscard]] int missed_reports() const { return missed_; }         // that were lost between two
   [[nodiscard]] double began_at() const { return began_at_; }          // by the guard's clock [s]
@@ -120,9 +120,9 @@ struct GuardedOptions {
   bool own_camera = false;  // the guard hears of the person from an estimator; else, beside a twin, from the clip by
   TwinCamera camera = {};
   bool policy_sees_clip = false;  // beside a twin: the policy sees the clip's partner in the place of the tracked one
-  double steps_from = 0.0;  // of the walking controller [m/s]
-  std::string engine;       // that stands in the row: "twin"
-  std::string recording;    // path of the recording to make (NPZ); empty: none
+  double steps_from = 0.0;        // of the walking controller [m/s]
+  std::string engine;             // that stands in the row: "twin"
+  std::string recording;          // path of the recording to make (NPZ); empty: none
   std::function<void(const GuardReport&)> watch = {};
   std::function<bool()> stop_asked = {};
 };

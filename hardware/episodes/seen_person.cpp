@@ -20,7 +20,7 @@
 namespace duet {
 namespace {
 
-constexpr double kBegins = 0.1;         // of a hand from where it hung [m]
+constexpr double kBegins = 0.1;  // of a hand from where it hung [m]
 constexpr double kWaitPeriod = 1.0 / 30.0;
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
@@ -160,7 +160,7 @@ SeenTask see_person(const std::vector<RecordedEstimate>& estimates, const SeenOp
                     Task task) {
   require(!estimates.empty(), "a dry run: expected estimates of a person, found none");
   SeenTask seen{.task = task, .estimates = counts_of(estimates)};
-  seen.ticks = ticks_of(estimates.back().at) + 1;
+  seen.ticks = ticks_of(estimates.back().at) + 2;  // the last one arrives, too
   PersonEstimate still;
   const bool somebody = std::ranges::any_of(estimates, [&](const RecordedEstimate& one) {
     return decode(bytes_of(one.bytes), still) == PersonFault::kNone && still.seen;

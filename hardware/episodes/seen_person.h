@@ -23,15 +23,15 @@ struct SeenOptions {
 
 struct SeenTask {
   Task task = Task::kWave;
-  bool ran = false;                     // the guard tracked somebody and ran
-  std::string message = {};             // why it did not, or what ended the run
+  bool ran = false;          // the guard tracked somebody and ran
+  std::string message = {};  // why it did not, or what ended the run
   Outcome outcome = Outcome::kError;
-  int ticks = 0;                        // of 20 ms, of the recording
-  std::optional<double> begins_at = {}; // a hand of the robot has left its place beside the pelvis by 0.1 m [s]
+  int ticks = 0;                           // of 20 ms, of the recording
+  std::optional<double> begins_at = {};    // a hand of the robot has left its place beside the pelvis by 0.1 m [s]
   double nearest = 0.0, nearest_at = 0.0;  // of a hand of the robot to one of the person as tracked [m], [s]
-  double walked = 0.0;                  // of the root, from where it stood [m]
-  int held_ticks = 0, unseen_ticks = 0; // the guard held; it tracked nobody
-  PersonCounts estimates{};             // of the recording
+  double walked = 0.0;                     // of the root, from where it stood [m]
+  int held_ticks = 0, unseen_ticks = 0;    // the guard held; it tracked nobody
+  PersonCounts estimates{};                // of the recording
   ClampCounts clamps{};
 };
 

@@ -18,9 +18,9 @@ namespace duet {
 namespace {
 
 constexpr const char* kCalibrationSchema = "duet.calibration/1";
-constexpr double kAnkle = 0.08;                 // of the ankles' joints over the floor, of somebody in shoes [m]
-constexpr double kStandsStill = 0.10;           // most that the estimates of one place may scatter [m]
-constexpr double kLeastAside = 0.3;             // of places from the line that fits them best [m]
+constexpr double kAnkle = 0.08;        // of the ankles' joints over the floor, of somebody in shoes [m]
+constexpr double kStandsStill = 0.10;  // most that the estimates of one place may scatter [m]
+constexpr double kLeastAside = 0.3;    // of places from the line that fits them best [m]
 constexpr int kLeastEstimates = 5, kLeastPlaces = 3;
 
 std::vector<double> numbers(const YamlSection& of, const char* key, std::size_t count, const char* what) {
@@ -59,13 +59,15 @@ MarkedPlace read_place(const std::string& path, const YAML::Node& node, std::siz
   place.p_BP = {at[0], at[1], kAnkle - height};
   measure_place(log, seconds[0], seconds[1], place);
   if (place.estimates < kLeastEstimates)
-    section.fail_key("seconds", fmt::format("expected at least {} estimates of somebody between {} s and {} s of the log, "
-                                            "found {}",
-                                            kLeastEstimates, seconds[0], seconds[1], place.estimates));
+    section.fail_key("seconds",
+                     fmt::format("expected at least {} estimates of somebody between {} s and {} s of the log, "
+                                 "found {}",
+                                 kLeastEstimates, seconds[0], seconds[1], place.estimates));
   if (place.moved > kStandsStill)
-    section.fail_key("seconds", fmt::format("expected somebody who stands still, found one whose ankles scatter by {:.2f} "
-                                            "m",
-                                            place.moved));
+    section.fail_key("seconds",
+                     fmt::format("expected somebody who stands still, found one whose ankles scatter by {:.2f} "
+                                 "m",
+                                 place.moved));
   return place;
 }
 
@@ -106,11 +108,13 @@ std::vector<MarkedPlace> read_marked_places(const std::string& path) {
 CameraCalibration calibrate_camera(std::span<const MarkedPlace> places, const std::string& name) {
   const auto n = static_cast<Eigen::Index>(places.size());
   if (n < kLeastPlaces)
-    throw InputError(fmt::format("{}: expected at least {} places where somebody stood, found {}", name, kLeastPlaces, n));
+    throw InputError(
+        fmt::format("{}: expected at least {} places where somebody stood, found {}", name, kLeastPlaces, n));
   if (const double off = aside(places); off < kLeastAside)
-    throw InputError(fmt::format("{}: expected places that do not lie on one line, found {} within {:.2f} m of one (at "
-                                 "least {} m)",
-                                 name, n, off, kLeastAside));
+    throw InputError(
+        fmt::format("{}: expected places that do not lie on one line, found {} within {:.2f} m of one (at "
+                    "least {} m)",
+                    name, n, off, kLeastAside));
   Eigen::Matrix3Xd p_C(3, n), p_B(3, n);
   for (Eigen::Index k = 0; k < n; ++k) {
     p_C.col(k) = places[static_cast<std::size_t>(k)].p_CP;
@@ -136,8 +140,7 @@ CameraCalibration calibrate_camera(std::span<const MarkedPlace> places, const st
   }
   found.rms = std::sqrt(squares / static_cast<double>(n));
   const double variance = squares / static_cast<double>(3 * n - 6);
-  const Eigen::Matrix<double, 6, 1> errors =
-      (variance * information.inverse().diagonal()).cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Matrix<double, 6, 1> errors = (variance * information.inverse().diagonal()).cwiseMax(0.0).cwiseSqrt();
   found.position_error = errors.head<3>();
   found.rotation_error = errors.tail<3>();
   return found;

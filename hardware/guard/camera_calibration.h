@@ -14,20 +14,20 @@ namespace duet {
 
 // Where somebody stood.
 struct MarkedPlace {
-  Eigen::Vector3d p_BP;    // the middle between their ankles, in the base's frame: the mark, at an ankle's height [m]
-  Eigen::Vector3d p_CP;    // the same as estimated: the mean [m]
-  double moved = 0.0;      // of the estimates about that mean, standard deviation [m]
+  Eigen::Vector3d p_BP;  // the middle between their ankles, in the base's frame: the mark, at an ankle's height [m]
+  Eigen::Vector3d p_CP;  // the same as estimated: the mean [m]
+  double moved = 0.0;    // of the estimates about that mean, standard deviation [m]
   int estimates = 0;
 };
 
 struct CameraCalibration {
   Pose X_BC;
-  double rms = 0.0;                   // of the residuals [m]
-  std::vector<double> residuals = {}; // of each place [m]
-  Eigen::Vector3d position_error;     // standard errors along the base's axes [m]
-  Eigen::Vector3d rotation_error;     // and about them [rad]
-  double scale = 1.0;                 // of the distances between marks to those between estimates: 1 for a camera whose
-                                      // focal length is the estimator's
+  double rms = 0.0;                    // of the residuals [m]
+  std::vector<double> residuals = {};  // of each place [m]
+  Eigen::Vector3d position_error;      // standard errors along the base's axes [m]
+  Eigen::Vector3d rotation_error;      // and about them [rad]
+  double scale = 1.0;  // of the distances between marks to those between estimates: 1 for a camera whose
+                       // focal length is the estimator's
 };
 
 // The places of `path` (docs/hardware.md, "Calibration"): YAML, with the person's log beside it. Throws InputError

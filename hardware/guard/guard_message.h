@@ -50,7 +50,7 @@ struct GuardReport {
   VelocityCommand root;      // that came out of the limiter
   ClampCounts clamps{};
   long old_messages = 0;
-  bool tracked = false;  // a person is, and was not long ago
+  bool tracked = false;                      // a person is, and was not long ago
   HumanJoints person = HumanJoints::Zero();  // where, for a policy (RobotGuard::tracked), in the frame of odometry [m]
 
   GuardReport();

@@ -75,8 +75,7 @@ Pose PersonPlacer::base_at(double time) const {
     if (before.at == kNever) break;
     if (before.at <= time) {
       const double part = (time - before.at) / (after->at - before.at);
-      return {before.X_WB.R.slerp(part, after->X_WB.R),
-              before.X_WB.p + part * (after->X_WB.p - before.X_WB.p)};
+      return {before.X_WB.R.slerp(part, after->X_WB.R), before.X_WB.p + part * (after->X_WB.p - before.X_WB.p)};
     }
     after = &before;
   }

@@ -30,9 +30,10 @@ std::vector<RecordedEstimate> parse_person_log(std::string_view bytes, const std
   double first = 0.0;
   for (std::size_t at = 0; at < bytes.size();) {
     const auto fail = [&](const std::string& found) {
-      throw InputError(fmt::format("'{}': message {} (byte {}): expected an estimate of a person of {} or {} bytes, with "
-                                   "a time of at most a day that does not fall, found {}",
-                                   excerpt(name), log.size() + 1, at, kFirstPersonBytes, kPersonBytes, found));
+      throw InputError(
+          fmt::format("'{}': message {} (byte {}): expected an estimate of a person of {} or {} bytes, with "
+                      "a time of at most a day that does not fall, found {}",
+                      excerpt(name), log.size() + 1, at, kFirstPersonBytes, kPersonBytes, found));
     };
     const std::size_t length = length_of(bytes.substr(at));
     if (length == 0) fail("another beginning than 'DPJ1' or 'DPJ2'");
@@ -42,12 +43,11 @@ std::vector<RecordedEstimate> parse_person_log(std::string_view bytes, const std
     if (log.empty()) first = stamp;
     const double time = stamp - first;
     if (!std::isfinite(stamp) || time > kLongest || time < (log.empty() ? 0.0 : log.back().at))
-      fail(fmt::format("a time of {} s after the first", time));
+      fail(fmt::format("a time of {:.3f} s after the first", time));
     log.push_back({time, std::string(bytes.substr(at, length))});
     at += length;
   }
-  if (log.empty())
-    throw InputError(fmt::format("'{}': expected estimates of a person, found nothing", excerpt(name)));
+  if (log.empty()) throw InputError(fmt::format("'{}': expected estimates of a person, found nothing", excerpt(name)));
   return log;
 }
 

@@ -12,8 +12,8 @@
 namespace duet {
 
 struct RecordedEstimate {
-  double at = 0.0;     // of its message, after the first one's [s]
-  std::string bytes;   // it, of 600 or 608 bytes
+  double at = 0.0;    // of its message, after the first one's [s]
+  std::string bytes;  // it, of 600 or 608 bytes
 };
 
 // Throws InputError naming the message: nothing there, no such message, one that is cut off, a clock that falls or is

@@ -34,8 +34,8 @@ std::string person_counts_text(const PersonCounts& counts) {
   std::string why;
   for (std::size_t k = 1; k < kPersonFaults; ++k)
     if (counts[k] > 0 && k != static_cast<std::size_t>(PersonFault::kUnseen))
-      why += fmt::format("{}{} {} ({})", why.empty() ? ": " : ", ", counts[k], kPersonFaultNames[k],
-                         kPersonFaultTexts[k]);
+      why +=
+          fmt::format("{}{} {} ({})", why.empty() ? ": " : ", ", counts[k], kPersonFaultNames[k], kPersonFaultTexts[k]);
   return fmt::format("estimates: {} used, {} without anybody, {} refused{}", used, unseen, refused, why);
 }
 

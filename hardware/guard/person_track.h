@@ -47,7 +47,8 @@ using PersonCounts = std::array<long, kPersonFaults>;
 
 // Refused: all but those that were used and those without anybody.
 long refused_estimates(const PersonCounts& counts);
-// "estimates: 120 used, 0 without anybody, 31 refused: 30 far (a joint further than 20 m from the camera), 1 body (...)";
+// "estimates: 120 used, 0 without anybody, 31 refused: 30 far (a joint further than 20 m from the camera), 1 body
+// (...)";
 // "" where none came.
 std::string person_counts_text(const PersonCounts& counts);
 

@@ -30,7 +30,7 @@ struct GuardHealth {
   double tracking = kUnknown;                        // largest angle between a joint and its target [rad]
   long ticks = 0, states = 0, checksum_faults = 0, tick_faults = 0, number_faults = 0;
   long old_messages = 0, bad_messages = 0, restarts = 0;
-  long left_out = 0;  // ticks that the log has no room for
+  long left_out = 0;      // ticks that the log has no room for
   PersonCounts person{};  // estimates of a person, by what became of them
 };
 

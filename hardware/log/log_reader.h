@@ -15,10 +15,10 @@ namespace duet {
 struct LogEvent {
   double time = 0.0;  // by the guard's clock [s]
   std::string state, cause;
-  long dropped = 0;   // ticks that are not in the log here
-  long restarts = 0;  // streams that were taken again after a pause
-  std::string text;   // as it stands in the log
-  long refused = 0;   // estimates of a person
+  long dropped = 0;      // ticks that are not in the log here
+  long restarts = 0;     // streams that were taken again after a pause
+  std::string text;      // as it stands in the log
+  long refused = 0;      // estimates of a person
   std::string why = {};  // they were
 };
 

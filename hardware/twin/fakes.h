@@ -79,9 +79,9 @@ class FakeSport {
 // one thread.
 
 struct PersonPlay {
-  double rate = 30.0;   // estimates a second
-  double noise = 0.02;  // on each axis of each joint, standard deviation [m]
-  double unseen = 0.0;  // share of estimates without anybody
+  double rate = 30.0;    // estimates a second
+  double noise = 0.02;   // on each axis of each joint, standard deviation [m]
+  double unseen = 0.0;   // share of estimates without anybody
   double latency = 0.0;  // that the messages state [s]
   std::uint64_t seed = 1;
 };

@@ -170,8 +170,7 @@ class TwinEpisodes {
                      "{:.1f} s in {:.1f} s",
                      index, guarded.row.task, guarded.row.policy, names().first, to_string(simulated.outcome),
                      simulated.success.value_or(false) ? "success" : "-", names().second,
-                     to_string(guarded.row.outcome),
-                     guarded.row.success.value_or(false) ? "success" : "-",
+                     to_string(guarded.row.outcome), guarded.row.success.value_or(false) ? "success" : "-",
                      guarded.row.message.empty() ? "" : " (" + guarded.row.message + ")", guarded.held_ticks,
                      guarded.missed_reports, guarded.unseen_ticks, guarded.guard_seconds, guarded.row.wall_s));
   }
@@ -303,11 +302,13 @@ void add_hardware_episodes(CLI::App& hardware, Session& session) {
   command->add_option("--noise", arguments->noise, "of the twin's sensors, as a share of the usual")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 100.0));
-  command->add_option("--camera", arguments->camera,
-                      "what the twin's camera gets wrong: noise=0.02,latency=0.1,unseen=0.05,jumps=0.01 [m, s, shares]");
-  command->add_option("--beside", arguments->beside,
-                      "what the twin is compared with: the simulator, or the twin with a policy that sees the clip's "
-                      "partner (clip) and not the one who is tracked")
+  command->add_option(
+      "--camera", arguments->camera,
+      "what the twin's camera gets wrong: noise=0.02,latency=0.1,unseen=0.05,jumps=0.01 [m, s, shares]");
+  command
+      ->add_option("--beside", arguments->beside,
+                   "what the twin is compared with: the simulator, or the twin with a policy that sees the clip's "
+                   "partner (clip) and not the one who is tracked")
       ->capture_default_str()
       ->check(CLI::IsMember({"simulator", "clip"}));
   command->add_option("-n,--limit", arguments->limit, "most episodes; 0: all")->check(CLI::Range(0, 1000000));
@@ -363,12 +364,13 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
     note(session, fmt::format("the guard: {} ({})", safety_state_name(report.state), stop_cause_name(report.cause)));
   };
   const GuardedRun run = run_guarded_episode(experiment, spec, link, options);
-  print(session,
-        fmt::format("{}{}; success: {}; {:.1f} s; held {} ticks, {} reports missed, nobody tracked in {}; executed: {}",
-                    to_string(run.row.outcome), run.row.message.empty() ? "" : " (" + run.row.message + ")",
-                    run.row.success.value_or(false) ? "yes" : "no", run.guard_seconds, run.held_ticks,
-                    run.missed_reports, run.unseen_ticks, executed_mask_text(run.executed, *experiment.bodies().nominal())),
-        to_json(run.row));
+  print(
+      session,
+      fmt::format("{}{}; success: {}; {:.1f} s; held {} ticks, {} reports missed, nobody tracked in {}; executed: {}",
+                  to_string(run.row.outcome), run.row.message.empty() ? "" : " (" + run.row.message + ")",
+                  run.row.success.value_or(false) ? "yes" : "no", run.guard_seconds, run.held_ticks, run.missed_reports,
+                  run.unseen_ticks, executed_mask_text(run.executed, *experiment.bodies().nominal())),
+      to_json(run.row));
   if (run.row.outcome == Outcome::kError) session.exit_code = kExitErrors;
 }
 

@@ -79,17 +79,17 @@ nlohmann::json seen_json(const SeenTask& seen) {
 
 std::string seen_row(const SeenTask& seen) {
   if (!seen.ran) return fmt::format("{:<10} does not run: {}", to_string(seen.task), seen.message);
-  return fmt::format("{:<10} {:>9} {:>7.2f} m at {:>5.1f} s {:>7.2f} m {:>7.2f} s {:>9.2f} s  {}{}", to_string(seen.task),
-                     seen.begins_at ? fmt::format("{:.2f} s", *seen.begins_at) : "never", seen.nearest,
-                     seen.nearest_at, seen.walked, seen.held_ticks * kTick, seen.unseen_ticks * kTick,
+  return fmt::format("{:<10} {:>9} {:>7.2f} m at {:>5.1f} s {:>7.2f} m {:>7.2f} s {:>9.2f} s  {}{}",
+                     to_string(seen.task), seen.begins_at ? fmt::format("{:.2f} s", *seen.begins_at) : "never",
+                     seen.nearest, seen.nearest_at, seen.walked, seen.held_ticks * kTick, seen.unseen_ticks * kTick,
                      to_string(seen.outcome), seen.message.empty() ? "" : " (" + seen.message + ")");
 }
 
 void run_see(Session& session, const SeeArguments& arguments) {
   SeenOptions options{.config = read_robot_config(arguments.config), .seed = arguments.seed};
   if (!options.config.has_camera)
-    throw InputError(fmt::format("{}: expected a 'camera', which says where the estimates are from, found none",
-                                 arguments.config));
+    throw InputError(
+        fmt::format("{}: expected a 'camera', which says where the estimates are from, found none", arguments.config));
   std::vector<Task> tasks;
   for (const std::string& name : arguments.tasks) tasks.push_back(parse_task(name));
   if (tasks.empty()) tasks.assign(kPaperTasks.begin(), kPaperTasks.end());
@@ -99,8 +99,9 @@ void run_see(Session& session, const SeeArguments& arguments) {
   note(session, fmt::format("plays {} estimates ({:.2f} s) into the guard of '{}' and policy '{}': a dry run beside a "
                             "twin in this process, nothing is written to any robot",
                             estimates.size(), estimates.back().at, arguments.config, arguments.policy));
-  std::string text = person_counts_text(counts) + "\ntask          begins   nearest hands       walked     held "
-                                                  "untracked  outcome";
+  std::string text = person_counts_text(counts) +
+                     "\ntask          begins   nearest hands       walked     held "
+                     "untracked  outcome";
   nlohmann::json rows = nlohmann::json::array();
   const std::shared_ptr<const RobotModel> robot = load_shared_robot();
   for (const Task task : tasks) {
@@ -134,23 +135,24 @@ nlohmann::json list_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()
 std::string camera_yaml(const Pose& X_BC) {
   const Eigen::Vector3d& p = X_BC.p;
   const Eigen::Quaterniond& R = X_BC.R;
-  return fmt::format("camera:\n  position: [{:.4f}, {:.4f}, {:.4f}]\n  quat_wxyz: [{:.7f}, {:.7f}, {:.7f}, {:.7f}]", p.x(),
-                     p.y(), p.z(), R.w(), R.x(), R.y(), R.z());
+  return fmt::format("camera:\n  position: [{:.4f}, {:.4f}, {:.4f}]\n  quat_wxyz: [{:.7f}, {:.7f}, {:.7f}, {:.7f}]",
+                     p.x(), p.y(), p.z(), R.w(), R.x(), R.y(), R.z());
 }
 
 std::string calibration_text(const CameraCalibration& found, std::span<const MarkedPlace> places) {
   std::string text = camera_yaml(found.X_BC);
-  text += fmt::format("\nstandard errors: position {:.4f}, {:.4f}, {:.4f} m along x, y, z of the base; rotation {:.4f}, "
-                      "{:.4f}, {:.4f} rad about them",
-                      found.position_error.x(), found.position_error.y(), found.position_error.z(),
-                      found.rotation_error.x(), found.rotation_error.y(), found.rotation_error.z());
+  text += fmt::format(
+      "\nstandard errors: position {:.4f}, {:.4f}, {:.4f} m along x, y, z of the base; rotation {:.4f}, "
+      "{:.4f}, {:.4f} rad about them",
+      found.position_error.x(), found.position_error.y(), found.position_error.z(), found.rotation_error.x(),
+      found.rotation_error.y(), found.rotation_error.z());
   text += fmt::format("\nresidual {:.4f} m (RMS of {} places); scale {:.3f}", found.rms, places.size(), found.scale);
   if (std::abs(found.scale - 1.0) > 0.05)
     text += ": the estimator's focal length is not the camera's, or the marks are not where the file has them";
   for (std::size_t k = 0; k < places.size(); ++k)
-    text += fmt::format("\n  place {} at {:.2f}, {:.2f} m: off by {:.4f} m; {} estimates, which scatter by {:.4f} m", k + 1,
-                        places[k].p_BP.x(), places[k].p_BP.y(), found.residuals[k], places[k].estimates,
-                        places[k].moved);
+    text +=
+        fmt::format("\n  place {} at {:.2f}, {:.2f} m: off by {:.4f} m; {} estimates, which scatter by {:.4f} m", k + 1,
+                    places[k].p_BP.x(), places[k].p_BP.y(), found.residuals[k], places[k].estimates, places[k].moved);
   return text;
 }
 
@@ -182,8 +184,9 @@ void run_calibrate(Session& session, const CalibrateArguments& arguments) {
 }  // namespace
 
 void add_calibrate(CLI::App& hardware, Session& session) {
-  CLI::App* command = add_command(hardware, session, "calibrate", "the camera on the body, from a person at marked places",
-                                  "duet hw calibrate places.yaml --config examples/hardware/camera.yaml");
+  CLI::App* command =
+      add_command(hardware, session, "calibrate", "the camera on the body, from a person at marked places",
+                  "duet hw calibrate places.yaml --config examples/hardware/camera.yaml");
   const auto arguments = std::make_shared<CalibrateArguments>();
   command->add_option("file", arguments->file, "where somebody stood when (YAML; docs/hardware.md, \"Calibration\")")
       ->required();
@@ -195,15 +198,19 @@ void add_calibrate(CLI::App& hardware, Session& session) {
 }
 
 void add_see(CLI::App& hardware, Session& session) {
-  CLI::App* command = add_command(hardware, session, "see", "what the robot would do beside recorded estimates of a person",
-                                  "duet hw see person.dpj --config examples/hardware/camera.yaml --task handshake");
+  CLI::App* command =
+      add_command(hardware, session, "see", "what the robot would do beside recorded estimates of a person",
+                  "duet hw see person.dpj --config examples/hardware/camera.yaml --task handshake");
   const auto arguments = std::make_shared<SeeArguments>();
   command
-      ->add_option("file", arguments->file,
-                   "messages of an estimator one after another, or a file of 4D-Humans with PHALP (.pkl) or GVHMR (.pt)")
+      ->add_option(
+          "file", arguments->file,
+          "messages of an estimator one after another, or a file of 4D-Humans with PHALP (.pkl) or GVHMR (.pt)")
       ->required();
   command->add_option("--config", arguments->config, "configuration of the robot, with its 'camera'")->required();
-  command->add_option("--task", arguments->tasks, "that the policy is told (may be given again); without: the six of the paper")
+  command
+      ->add_option("--task", arguments->tasks,
+                   "that the policy is told (may be given again); without: the six of the paper")
       ->allow_extra_args(false);
   command->add_option("--policy", arguments->policy, "that sees the person")->capture_default_str();
   command->add_option("--body-model", arguments->body_model, "of a video's file: SMPL, SMPL-H or SMPL-X (yours)");

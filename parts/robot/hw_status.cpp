@@ -93,7 +93,8 @@ std::string status_text(const RobotGuard& guard, double seconds) {
       readiness(guard), status.states, seconds, status.checksum_faults, status.tick_faults, status.number_faults,
       health.tilt, health.casing, health.winding, health.charge,
       status.input.remote_at == kNever ? "not heard" : "heard, " + keys_text(guard.reading().remote),
-      status.input.foreign_writer ? "yes" : "none", estimates.empty() ? "" : "\n  person: " + estimates, clamp_text(status.clamps), reading_text(guard));
+      status.input.foreign_writer ? "yes" : "none", estimates.empty() ? "" : "\n  person: " + estimates,
+      clamp_text(status.clamps), reading_text(guard));
 }
 
 namespace {

@@ -346,8 +346,8 @@ bool is_video_person(const std::string& path) {
 VideoPerson read_video_person(const std::string& path, const VideoPersonOptions& options) {
   if (path.ends_with(".pkl") && is_phalp_file(path)) return read_phalp_person(path, options);
   if (path.ends_with(".pt") && is_torch_person(path)) return read_gvhmr_person(path, options);
-  throw InputError(fmt::format("'{}': expected a file of 4D-Humans with PHALP (.pkl) or GVHMR (.pt), found another",
-                               excerpt(path)));
+  throw InputError(
+      fmt::format("'{}': expected a file of 4D-Humans with PHALP (.pkl) or GVHMR (.pt), found another", excerpt(path)));
 }
 
 const PeopleFormat& wham_format() {

@@ -29,7 +29,8 @@ const std::vector<Eigen::Vector2d> kMarks = {{1.5, 0.0}, {2.5, 0.8}, {2.5, -0.8}
 MarkedPlace stood_at(const Eigen::Vector2d& mark, Random& random, double noise) {
   MarkedPlace place;
   place.p_BP = {mark.x(), mark.y(), 0.08 - kHeight};
-  place.p_CP = true_camera().inverse() * place.p_BP + noise * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+  place.p_CP =
+      true_camera().inverse() * place.p_BP + noise * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
   place.estimates = 30;
   return place;
 }

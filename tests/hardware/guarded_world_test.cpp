@@ -246,7 +246,8 @@ struct Watched {
   PersonCounts counts{};
 };
 
-// In the episode's own frame, as late as the estimates are and the track looks back: 40 ms, or 140 with a camera of 100.
+// In the episode's own frame, as late as the estimates are and the track looks back: 40 ms, or 140 with a camera of
+// 100.
 TEST(GuardedWorld, ThePolicySeesThePersonWhomTheGuardTracks) {
   for (const double latency : {0.0, 0.1}) {
     const Watched watched({.latency = latency});

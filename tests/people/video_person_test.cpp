@@ -69,7 +69,8 @@ TEST(VideoPerson, NamesWhatIsWrong) {
   };
   const test::BodyParameters body = test::body_parameters(3, 0.3);
   EXPECT_SENTENCE(refusal("world.pt", test::gvhmr_pt(body)));
-  EXPECT_SENTENCE(refusal("nobody.pkl", test::phalp_pkl({}, 2)));
+  EXPECT_SENTENCE(test::thrown_message<InputError>(
+      [&] { (void)read_phalp_person(write(folder, "nobody.pkl", test::phalp_pkl({}, 2)), {}); }));
   EXPECT_SENTENCE(refusal("text.txt", "text"));
   EXPECT_FALSE(is_video_person(folder / "text.txt"));
 }
