@@ -167,7 +167,7 @@ void run_calibrate(Session& session, const CalibrateArguments& arguments) {
                          {"rotation_error", list_json(found.rotation_error)},
                          {"rms", found.rms},
                          {"residuals", found.residuals},
-                         {"scale", found.scale}};
+                         {"scale", number_or_null(found.scale)}};
   if (!arguments.config.empty()) {
     const Pose& X_BC = read_robot_config(arguments.config).camera.X_BC;
     const double apart = (X_BC.p - found.X_BC.p).norm(), turned = X_BC.R.angularDistance(R);

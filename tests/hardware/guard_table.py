@@ -188,7 +188,7 @@ EDITS = {
         ('sport: a velocity ends', choice('std::clamp(duration, kShortest, kLongest)', 'duration')),
         ('sport: a velocity is a number', choice('std::isfinite(value) ? std::clamp(value, -kMostVelocity, kMostVelocity) : 0.0', 'value')),
     ],
-    ('hardware/guard/person_input.cpp', 'PersonInput*:PersonTrack*'): [
+    ('hardware/guard/person_input.cpp', 'PersonInput*:PersonPlacer*'): [
         ('person: finite', unless('!joints.allFinite()')),
         ('person: far', unless('joints.colwise().norm().maxCoeff() > kFarthestJoint')),
         ('person: bones', unless('(joints.col(j) - joints.col(kSmplParents[static_cast<std::size_t>(j)])).norm() > kLongestBone')),

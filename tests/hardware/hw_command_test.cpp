@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "duet/core/file.h"
+#include "duet/hardware/guard/person_log.h"
 #include "duet/hardware/wire/robot_wire.h"
 #include "tests/app/program.h"
 
@@ -103,6 +104,66 @@ TEST(HwCommand, ADryRunOfATwinIsReadyAndItsLogIsTheSameAgain) {
   const Answer replay = duet_program("replay-log --json " + (folder / "run.mcap"));
   EXPECT_EQ(replay.code, 0) << replay.err;
   EXPECT_THAT(replay.out, HasSubstr("\"different\": 0"));
+}
+
+// Somebody `ahead` of the camera of examples/hardware/camera.yaml, for two seconds.
+std::string person_at(double ahead, const test::ScratchFolder& folder) {
+  std::vector<RecordedEstimate> log;
+  for (std::uint64_t k = 0; k < 60; ++k) {
+    PersonEstimate estimate;
+    estimate.sequence = k + 1;
+    estimate.stamp = static_cast<double>(k) / 30.0;
+    estimate.seen = true;
+    for (int j = 0; j < kSmplJoints; ++j) estimate.joints.col(j) = Eigen::Vector3d(0.01 * j, 0.02 * j, ahead);
+    log.push_back(recorded(estimate));
+  }
+  const std::string path = folder / "person.dpj";
+  write_file(path, person_log(log));
+  return path;
+}
+
+TEST(HwCommand, SeeSaysWhatTheRobotWouldDoTaskByTask) {
+  const test::ScratchFolder folder;
+  const std::string camera = std::string(DUET_SOURCE_DIR) + "/examples/hardware/camera.yaml";
+  const std::string command = "hw see " + person_at(4.0, folder) + " --policy null --task wave --task hug --config ";
+  const Answer seen = duet_program(command + camera + " --json");
+  EXPECT_EQ(seen.code, 0) << seen.err;
+  EXPECT_THAT(seen.err, HasSubstr("nothing is written to any robot"));
+  EXPECT_THAT(seen.out, HasSubstr("\"used\": 60"));
+  EXPECT_THAT(seen.out, HasSubstr("\"task\": \"hug\""));
+  EXPECT_THAT(duet_program(command + camera).out, HasSubstr("estimates: 60 used, 0 without anybody, 0 refused\n"));
+  write_file(folder / "blind.yaml", config_of());
+  const Answer blind = duet_program(command + (folder / "blind.yaml"));
+  EXPECT_EQ(blind.code, 2);
+  EXPECT_THAT(blind.err, HasSubstr("expected a 'camera', which says where the estimates are from, found none"));
+  const Answer focal = duet_program(command + camera + " --focal-length 900");
+  EXPECT_EQ(focal.code, 2);
+  EXPECT_THAT(focal.err, HasSubstr("expected both or none of them, found one"));
+  const Answer far =
+      duet_program("hw see " + person_at(55.0, folder) + " --policy null --task wave --config " + camera);
+  EXPECT_EQ(far.code, 3);
+  EXPECT_THAT(far.out, HasSubstr("does not run: no estimate could be used"));
+  EXPECT_THAT(far.out, HasSubstr("60 far (a joint further than 20 m from the camera"));
+}
+
+TEST(HwCommand, CalibratePrintsTheCameraOrSaysWhatIsMissing) {
+  const test::ScratchFolder folder;
+  person_at(2.0, folder);
+  const std::string head = "schema: duet.calibration/1\nlog: person.dpj\nheight: 0.74\nplaces:\n";
+  write_file(folder / "two.yaml", head + "  - {at: [2, 0], seconds: [0, 1]}\n  - {at: [3, 1], seconds: [1, 2]}\n");
+  const Answer two = duet_program("hw calibrate " + (folder / "two.yaml"));
+  EXPECT_EQ(two.code, 2);
+  EXPECT_THAT(two.err, HasSubstr("expected at least 3 places where somebody stood, found 2"));
+  // Somebody who never moved stood at three places: no camera fits, and the residual says so.
+  write_file(folder / "still.yaml", head +
+                                        "  - {at: [2, 0], seconds: [0, 0.6]}\n  - {at: [3, 1], seconds: [0.7, 1.2]}\n"
+                                        "  - {at: [3, -1], seconds: [1.3, 1.9]}\n");
+  const Answer still = duet_program("hw calibrate " + (folder / "still.yaml") + " --config " + DUET_SOURCE_DIR +
+                                    "/examples/hardware/camera.yaml");
+  EXPECT_EQ(still.code, 1);
+  EXPECT_THAT(still.out, HasSubstr("camera:\n  position: ["));
+  EXPECT_THAT(still.out, HasSubstr("standard errors: position"));
+  EXPECT_THAT(still.out, HasSubstr("not good: expected a residual of at most 0.1 m"));
 }
 
 // A dry run tells its status, and leaves a log that a report is made of.
