@@ -274,6 +274,8 @@ TEST(RunLog, ACutLogIsCoveredByChecksumsUpToTheChunkThatWasCut) {
   bytes.resize((whole[2].first + whole[2].second) / 2);
   const auto chunks = chunks_of(bytes);
   ASSERT_EQ(chunks.size(), 2u);
+  write_file(folder / "cut.mcap", bytes);
+  const LogReplay cut = replay_log(folder / "cut.mcap");
   constexpr int kFlips = 30;
   int refused = 0;
   for (const auto& [begin, end] : chunks)
@@ -283,12 +285,13 @@ TEST(RunLog, ACutLogIsCoveredByChecksumsUpToTheChunkThatWasCut) {
       flipped[at] = static_cast<char>(flipped[at] ^ 0x10);
       write_file(folder / "flipped.mcap", flipped);
       try {
-        (void)replay_log(folder / "flipped.mcap");
+        const LogReplay replay = replay_log(folder / "flipped.mcap");  // zstd's frames have bits that say nothing
+        EXPECT_TRUE(replay.ticks == cut.ticks && replay.different == 0) << at;
       } catch (const InputError&) {
         ++refused;
       }
     }
-  EXPECT_EQ(refused, 2 * kFlips);
+  EXPECT_GE(refused, 2 * kFlips - 2);
 }
 
 TEST(RunLog, ALogThatIsCutAnywhereIsReplayedAsFarAsItGoes) {
