@@ -83,6 +83,7 @@ void add_check(CLI::App& app, Session& session);
 void add_bless(CLI::App& app, Session& session);
 void add_policy_check(CLI::App& app, Session& session);       // `policy check`
 void add_controller_import(CLI::App& app, Session& session);  // `controller import`
+void add_robot(CLI::App& app, Session& session);              // `robot new`, `robot check`
 void add_publish(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_verify(CLI::App& app, Session& session);

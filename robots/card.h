@@ -14,6 +14,7 @@
 
 #include "duet/core/robot_state.h"
 #include "duet/robots/robot_model.h"
+#include "duet/robots/urdf.h"
 #include "duet/robots/yaml_section.h"
 
 namespace duet {
@@ -136,6 +137,13 @@ inline constexpr int kMostExtended = 8;
 // `file` names the card and is where `extends` starts from; what it extends is read and is a card of its own, whose
 // keys stand where the card has none. Throws InputError as YamlSection does, and for a cycle, naming both files.
 RobotCard parse_card(const std::string& text, const std::string& file);
+
+// The URDF of a card: beside it, or, where that may not be passed on, where files of others are. The first place where
+// it is nowhere.
+std::string urdf_of(const std::string& card_path, const RobotCard& card);
+
+// A sentence on the <dynamics> of the joints that the robot moves, which is not simulated; "" where it has none.
+std::string dynamics_note(const RobotModel& robot, const UrdfModel& urdf, const std::string& file);
 
 // Which robot a row was run on. The digest of a robot is of the URDF's bytes and of what its card says with all that it
 // extends, in one spelling: comments, the order of keys, the way numbers are written and how keys are spread over files

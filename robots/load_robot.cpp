@@ -375,7 +375,8 @@ class Loader {
   RobotModel model_;
 };
 
-// Damping and friction of the joints that the robot moves.
+}  // namespace
+
 std::string dynamics_note(const RobotModel& robot, const UrdfModel& urdf, const std::string& file) {
   int joints = 0;
   double damping = 0.0, friction = 0.0;
@@ -393,7 +394,6 @@ std::string dynamics_note(const RobotModel& robot, const UrdfModel& urdf, const 
       file, joints, damping, friction);
 }
 
-// The URDF of a card: beside it, or, where that may not be passed on, where files of others are.
 std::string urdf_of(const std::string& card_path, const RobotCard& card) {
   const std::vector<std::string> places =
       published_places(std::filesystem::path(card_path).parent_path().string(), card.urdf);
@@ -402,8 +402,6 @@ std::string urdf_of(const std::string& card_path, const RobotCard& card) {
     if (std::filesystem::exists(place, ignored)) return place;
   return places.front();
 }
-
-}  // namespace
 
 RobotModel load_robot(const std::string& card_path, const std::string& urdf_path) {
   const std::string card_text = read_text(card_path);

@@ -83,6 +83,28 @@ void check_encoding(std::string_view text, const std::string& file) {
   if (wide) throw InputError(fmt::format("{}: expected UTF-8, found UTF-16 or UTF-32: save it as UTF-8", file));
 }
 
+// Files of other kinds that come with robots, by what they begin with or what their outermost element is.
+void refuse_mesh(std::string_view text, const std::string& file) {
+  const size_t first = std::min(text.find_first_not_of(" \t\r\n"), text.size());
+  const std::string_view begin = text.substr(first);
+  const bool binary = text.substr(0, 512).find('\0') != std::string_view::npos;
+  if (begin.starts_with("solid") || begin.starts_with("ply\n") || begin.starts_with("glTF") || binary)
+    throw InputError(
+        fmt::format("{}: expected a URDF, found a mesh or another binary file: a description names meshes, and has "
+                    "links, joints and inertias",
+                    file));
+}
+
+[[noreturn]] void refuse_root(const TiXmlDocument& document, const std::string& file) {
+  const TiXmlElement* const root = document.RootElement();
+  const std::string name = root == nullptr ? "" : root->ValueStr();
+  if (name == "mujoco" || name == "sdf" || name == "COLLADA" || name == "model")
+    throw InputError(fmt::format(
+        "{}: expected a URDF, whose first element is <robot>, found <{}>: {}", file, name,
+        name == "COLLADA" ? "a mesh" : "a description of another format; take the maker's URDF or convert it"));
+  throw InputError(fmt::format("{}: expected the element <robot>, found none", file));
+}
+
 // A file that xacro is still to be run on: any of its elements, or "${...}" and "$(...)" in an attribute.
 void refuse_xacro(const TiXmlElement& element, const std::string& file) {
   const auto refuse = [&](const std::string& found) {
@@ -102,6 +124,7 @@ std::string without_geometry(const std::string& text, const std::string& file) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos)
     throw InputError(fmt::format("{}: expected a URDF, found an empty file", file));
   check_encoding(text, file);
+  refuse_mesh(text, file);
   check_xml_nesting(text, file);
   TiXmlDocument document;
   document.Parse(text.c_str());
@@ -109,7 +132,7 @@ std::string without_geometry(const std::string& text, const std::string& file) {
     throw InputError(fmt::format("{}:{}: expected well-formed XML, found: {}", file, std::max(document.ErrorRow(), 1),
                                  document.ErrorDesc()));
   TiXmlElement* const robot = document.FirstChildElement("robot");
-  if (robot == nullptr) throw InputError(fmt::format("{}: expected the element <robot>, found none", file));
+  if (robot == nullptr) refuse_root(document, file);
   refuse_xacro(*robot, file);
   check_joints(*robot, file);
   for (const char* name : {"material", "transmission", "gazebo", "mujoco", "sensor"}) remove_children(*robot, name);
