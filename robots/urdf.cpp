@@ -6,12 +6,15 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <map>
 #include <mutex>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "duet/core/require.h"
@@ -119,8 +122,56 @@ void refuse_xacro(const TiXmlElement& element, const std::string& file) {
     refuse_xacro(*child, file);
 }
 
+// Three numbers of an attribute; none where there are not three that are finite and of a robot's size.
+std::optional<Eigen::Vector3d> three_numbers(const char* text) {
+  constexpr double kMostSize = 100.0;
+  Eigen::Vector3d v;
+  if (text == nullptr || std::sscanf(text, "%lf %lf %lf", &v.x(), &v.y(), &v.z()) != 3) return std::nullopt;
+  if (!v.allFinite() || v.cwiseAbs().maxCoeff() > kMostSize) return std::nullopt;
+  return v;
+}
+
+// A collision element as the box around it; none for a mesh, and for one that says too little.
+std::optional<UrdfBox> box_of(const TiXmlElement& collision) {
+  const TiXmlElement* const geometry = collision.FirstChildElement("geometry");
+  const TiXmlElement* const shape = geometry == nullptr ? nullptr : geometry->FirstChildElement();
+  if (shape == nullptr) return std::nullopt;
+  UrdfBox box;
+  double radius = 0.0, length = 0.0;
+  if (const TiXmlElement* const origin = collision.FirstChildElement("origin")) {
+    box.X_LB.p = three_numbers(origin->Attribute("xyz")).value_or(Eigen::Vector3d::Zero());
+    const Eigen::Vector3d rpy = three_numbers(origin->Attribute("rpy")).value_or(Eigen::Vector3d::Zero());
+    box.X_LB.R = Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+                 Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+                 Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX());
+  }
+  if (shape->ValueStr() == "box") {
+    const std::optional<Eigen::Vector3d> size = three_numbers(shape->Attribute("size"));
+    if (!size) return std::nullopt;
+    box.half = 0.5 * *size;
+  } else if (shape->QueryDoubleAttribute("radius", &radius) == TIXML_SUCCESS) {
+    if (shape->QueryDoubleAttribute("length", &length) != TIXML_SUCCESS) length = 2.0 * radius;
+    box.half = {radius, radius, 0.5 * length};
+  }
+  const bool solid = box.half.allFinite() && box.half.minCoeff() > 0.0 && box.half.maxCoeff() < 100.0;
+  return solid ? std::optional(box) : std::nullopt;
+}
+
+std::map<std::string, std::vector<UrdfBox>> boxes_of(const TiXmlElement& robot) {
+  std::map<std::string, std::vector<UrdfBox>> boxes;
+  for (const TiXmlElement* link = robot.FirstChildElement("link"); link != nullptr;
+       link = link->NextSiblingElement("link")) {
+    const char* const name = link->Attribute("name");
+    for (const TiXmlElement* one = link->FirstChildElement("collision"); one != nullptr && name != nullptr;
+         one = one->NextSiblingElement("collision"))
+      if (const std::optional<UrdfBox> box = box_of(*one)) boxes[name].push_back(*box);
+  }
+  return boxes;
+}
+
 // The text without what duet does not look at: a shape or material that urdfdom does not know is then no error.
-std::string without_geometry(const std::string& text, const std::string& file) {
+std::string without_geometry(const std::string& text, const std::string& file,
+                             std::map<std::string, std::vector<UrdfBox>>& boxes) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos)
     throw InputError(fmt::format("{}: expected a URDF, found an empty file", file));
   check_encoding(text, file);
@@ -135,6 +186,7 @@ std::string without_geometry(const std::string& text, const std::string& file) {
   if (robot == nullptr) refuse_root(document, file);
   refuse_xacro(*robot, file);
   check_joints(*robot, file);
+  boxes = boxes_of(*robot);
   for (const char* name : {"material", "transmission", "gazebo", "mujoco", "sensor"}) remove_children(*robot, name);
   for (TiXmlElement* link = robot->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link"))
     for (const char* name : {"visual", "collision"}) remove_children(*link, name);
@@ -305,7 +357,8 @@ const char* to_string(UrdfJointType type) {
 }
 
 UrdfModel parse_urdf(const std::string& text, const std::string& file) {
-  const urdf::ModelInterfaceSharedPtr source = parse(without_geometry(text, file), file);
+  std::map<std::string, std::vector<UrdfBox>> boxes;
+  const urdf::ModelInterfaceSharedPtr source = parse(without_geometry(text, file, boxes), file);
   UrdfModel model;
   std::set<std::string> visited;
   const std::function<void(const urdf::Link&)> visit = [&](const urdf::Link& link) {
@@ -313,6 +366,7 @@ UrdfModel parse_urdf(const std::string& text, const std::string& file) {
       throw InputError(fmt::format("{}: link '{}': expected one parent, found two", file, excerpt(link.name)));
     const int index = static_cast<int>(model.links.size());
     model.links.push_back(to_link(link, file));
+    model.links.back().boxes = boxes[link.name];
     for (const urdf::JointSharedPtr& child : link.child_joints) {
       UrdfJoint joint = to_joint(*child, file);
       joint.parent = index;

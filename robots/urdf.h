@@ -1,5 +1,5 @@
-// A URDF as the loader needs it: links with inertia and joints in a tree, checked. Geometry, meshes, materials and
-// transmissions are not looked at.
+// A URDF as the loader needs it: links with inertia and joints in a tree, checked. Meshes, materials and transmissions
+// are not looked at, simple collision shapes only to propose where a foot's sole is.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,11 +14,18 @@ namespace duet {
 enum class UrdfJointType { kFixed, kRevolute, kContinuous, kPrismatic, kFloating, kPlanar };
 const char* to_string(UrdfJointType type);
 
+// A box, sphere or cylinder of a link's collision elements, by the box around it.
+struct UrdfBox {
+  Pose X_LB;                                       // its centre
+  Eigen::Vector3d half = Eigen::Vector3d::Zero();  // half its sides [m]
+};
+
 struct UrdfLink {
   std::string name;
   double mass = 0.0;                                  // [kg], 0 where the link has no inertial element
   Eigen::Vector3d com = Eigen::Vector3d::Zero();      // p_LCom [m]
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about the centre of mass, axes of L [kg m^2]
+  std::vector<UrdfBox> boxes;                         // of its collision elements; meshes have none
 };
 
 struct UrdfJoint {

@@ -8,7 +8,9 @@
 
 #include "duet/app/command.h"
 #include "duet/controllers/catalogue/registry.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/robots/authoring/card_draft.h"
 #include "duet/robots/authoring/robot_check.h"
 
 namespace duet::cli {
@@ -85,11 +87,56 @@ void run_check(Session& session, const std::string& card) {
   if (!check.can_run()) session.exit_code = kExitGate;
 }
 
+struct NewArguments {
+  std::string urdf, output, name;
+  bool force = false;
+};
+
+void run_new(Session& session, const NewArguments& arguments) {
+  namespace fs = std::filesystem;
+  std::string in_card = arguments.urdf;
+  if (!arguments.output.empty()) {
+    if (!arguments.output.ends_with(".yaml"))
+      throw InputError(fmt::format("--output: expected a card's file name (.yaml), found '{}'", arguments.output));
+    if (fs::exists(arguments.output) && !arguments.force)
+      throw InputError(
+          fmt::format("{}: expected a new file, found one that is there: --force writes over it", arguments.output));
+    const std::string near =
+        fs::proximate(fs::absolute(arguments.urdf), fs::absolute(arguments.output).parent_path()).string();
+    in_card = near.starts_with("../../..") ? fs::absolute(arguments.urdf).string() : near;
+  }
+  const std::string name =
+      arguments.name.empty() && !arguments.output.empty() ? fs::path(arguments.output).stem().string() : arguments.name;
+  const CardDraft made = draft_card(read_text(arguments.urdf), arguments.urdf, name, in_card);
+  if (!arguments.output.empty()) write_file(arguments.output, made.text);
+  for (const std::string& sentence : made.proposed) note(session, "proposed: " + sentence);
+  for (const std::string& sentence : made.missing) note(session, "to look up: " + sentence);
+  const std::string said =
+      fmt::format("{}: a card of '{}'; {} things to look up\n", arguments.output, made.name, made.missing.size());
+  print(session, arguments.output.empty() ? made.text : said,
+        {{"name", made.name}, {"card", made.text}, {"proposed", made.proposed}, {"missing", made.missing}});
+  if (!arguments.output.empty()) suggest_next(session, fmt::format("duet robot check {}", arguments.output));
+}
+
+void add_new(CLI::App& robot, Session& session) {
+  CLI::App* command = add_command(robot, session, "new",
+                                  "write the scaffold of a robot card from a URDF: joints, roles by geometry, soles, "
+                                  "tracks; what it assumes is marked, what is to be looked up stands on standard error",
+                                  "duet robot new robot.urdf -o my.yaml");
+  auto arguments = std::make_shared<NewArguments>();
+  command->add_option("urdf", arguments->urdf, "URDF of the robot (run xacro first)")->required();
+  command->add_option("--name", arguments->name, "name of the robot (default: the file's)");
+  command->add_option("-o,--output", arguments->output, "file of the card (default: standard output)");
+  command->add_flag("--force", arguments->force, "write over a card that is there");
+  command->callback([&session, arguments] { run_new(session, *arguments); });
+}
+
 }  // namespace
 
 void add_robot(CLI::App& app, Session& session) {
   CLI::App* robot = app.add_subcommand("robot", "one robot: a card from its URDF, and what a run needs of a card");
   robot->require_subcommand(1);
+  add_new(*robot, session);
   CLI::App* command = add_command(*robot, session, "check",
                                   "say with figures what a run will need of a robot card, and what is missing or "
                                   "contradicts itself (1: no run can begin)",

@@ -47,5 +47,26 @@ TEST(RobotCommand, CheckRefusesWhatIsNoCard) {
   EXPECT_EQ(duet_program("robot").code, 2);
 }
 
+TEST(RobotCommand, NewWritesACardThatCheckReads) {
+  const test::ScratchFolder folder;
+  write_file(folder / "t1.urdf", read_file(kT1 + "t1.urdf"));
+  const std::string card = folder / "mine.yaml", make = "robot new " + (folder / "t1.urdf") + " -o " + card;
+  const Answer made = duet_program(make);
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_THAT(made.out, HasSubstr("a card of 'mine'"));
+  EXPECT_THAT(made.err, HasSubstr("proposed: legs: 6 hinges a side: pitch, roll, yaw, pitch, pitch, roll"));
+  EXPECT_EQ(duet_program("robot check " + card).code, 0);
+  const std::string text = read_file(card);
+  EXPECT_THAT(text, HasSubstr("urdf: t1.urdf\n"));
+  const Answer again = duet_program(make + " --name other");
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("expected a new file, found one that is there: --force writes over it"));
+  EXPECT_EQ(read_file(card), text);
+  EXPECT_EQ(duet_program(make + " --name other --force").code, 0);
+  EXPECT_THAT(read_file(card), HasSubstr("name: other\n"));
+  EXPECT_EQ(duet_program("robot new " + (folder / "t1.urdf") + " -o " + (folder / "card.txt")).code, 2);
+  EXPECT_THAT(duet_program("robot new " + (folder / "t1.urdf")).out, HasSubstr("# Scaffold of a robot card"));
+}
+
 }  // namespace
 }  // namespace duet

@@ -62,7 +62,8 @@ TEST_P(PublishedBodies, HaveTheNumbersOfTheMakersDescription) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, PublishedBodies,
-                         testing::Values(PublishedBody{"h1", 10, 51.650, 1.0342, "h1/h1.urdf"},
+                         testing::Values(PublishedBody{"agibot_x1", 12, 36.064, 0.6130, ""},
+                                         PublishedBody{"h1", 10, 51.650, 1.0342, "h1/h1.urdf"},
                                          PublishedBody{"h1_2", 12, 67.368, 1.0151, ""},
                                          PublishedBody{"t1_12dof", 12, 31.614, 0.6709,
                                                        "t1/booster_gym/T1_locomotion.urdf"},

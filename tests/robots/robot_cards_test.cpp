@@ -29,8 +29,8 @@ std::vector<std::string> names() {
 }
 
 TEST_F(RobotCards, AreAllFoldersBelowRobotsTheOneThatStandsInFirst) {
-  EXPECT_THAT(names(), testing::ElementsAre("g1", "g1_12dof", "g1_27dof", "g1_playground", "g1_twist2", "h1", "h1_2",
-                                            "t1", "t1_12dof", "t1_23dof", "xbot_l"));
+  EXPECT_THAT(names(), testing::ElementsAre("g1", "agibot_x1", "g1_12dof", "g1_27dof", "g1_playground", "g1_twist2",
+                                            "h1", "h1_2", "t1", "t1_12dof", "t1_23dof", "xbot_l"));
   EXPECT_EQ(robot_cards().back().folder, "robots/xbot_l");
   EXPECT_EQ(robot_cards().front().path, default_card_path());
 }

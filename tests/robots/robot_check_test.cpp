@@ -81,7 +81,8 @@ INSTANTIATE_TEST_SUITE_P(
         CardDefect{"joint_left_out", false,
                    "  - {name: Waist,                 armature: 0.03, kp: 200, kd:   5, neutral:     0}\n", "",
                    "joints", kMissing, true},
-        CardDefect{"hand_is_a_sole", false, "radius: 0.045, region: hand}", "radius: 0.045, region: hand, sole: true}", "soles", kWrong, true},
+        CardDefect{"hand_is_a_sole", false, "radius: 0.045, region: hand}", "radius: 0.045, region: hand, sole: true}",
+                   "soles", kWrong, true},
         CardDefect{"one_foot_high", false, "center: [-0.07, -0.042, -0.03], radius: 0.01, region: foot, sole: true}",
                    "center: [-0.07, -0.042, -0.06], radius: 0.01, region: foot, sole: true}", "soles", kWrong, false},
         CardDefect{
