@@ -127,6 +127,7 @@ constexpr Entry kControllers[] = {{"pd", pd_info, load_pd, no_files},
                                   {"playground_t1", published_info, load_published, published_files},
                                   {"rl_gym_h1", published_info, load_published, published_files},
                                   {"rl_gym_h1_2", published_info, load_published, published_files},
+                                  {"agibot_x1", published_info, load_published, published_files},
                                   {"humanoid_gym", published_info, load_published, published_files}};
 // A name that is the path of an IO descriptor.
 constexpr Entry kDescriptor = {"", published_info, load_published, published_files};

@@ -17,6 +17,7 @@
 #include <set>
 #include <utility>
 
+#include "duet/core/json.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/robots/authoring/limbs.h"
@@ -39,7 +40,7 @@ std::string yaml_word(const std::string& name) {
   const bool plain = !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '/';
   }) && name[0] != '-';
-  return plain ? name : nlohmann::json(name).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  return plain ? name : dumped(nlohmann::json(name));
 }
 
 double rounded(double value, double step) { return std::round(value / step) * step + 0.0; }

@@ -270,7 +270,7 @@ class Findings {
     const std::string text = fmt::format("waist of {}, arms of {}, {} of their joints wrists", roles.waist.size(),
                                          roles.arms[0].size(), roles.wrists.size());
     if (!roles.arms[0].empty()) return add("upper body", kOk, text);
-    add("upper body", kNote, text, "it walks; tasks of two people need arms ('arms')");
+    add("upper body", kNote, text, "a walk needs none; tasks of two people need 'arms'");
   }
 
   // Whether a frame that has a side lies on that side of the pelvis.
@@ -313,7 +313,7 @@ class Findings {
       return add("people", kWrong, fmt::format("{}; on the other side of the pelvis: {}", text, named(astray)),
                  "left is +y of a robot that looks along +x");
     add("people", whole ? kOk : kMissing, text,
-        whole ? "" : "it walks; retarget and score need 'keypoints' and 'pairs' of a robot that meets people");
+        whole ? "" : "a walk needs none; retarget and score need 'keypoints' and 'pairs'");
   }
 
   void shapes() {

@@ -23,6 +23,7 @@ struct Walker {
 };
 
 constexpr const char* kBerkeley = "berkeley_humanoid_lite/berkeley_humanoid_lite.urdf";
+constexpr const char *kGr1T1 = "gr1t1/GR1T1_simple.urdf", *kGr1T2 = "gr1t2/GR1T2_simple.urdf";
 
 // The body, with a description from a path where it does not ship.
 WalkSetup walking(const Walker& walker, const std::string& command) {
@@ -68,6 +69,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Walker{"g1_deploy_amp", 0.428, 0.05}, Walker{"booster_gym", 0.446, 0.05},
                     Walker{"playground_t1", 0.492, 0.05}, Walker{"rl_gym_h1", 0.458, 0.5},
                     Walker{"rl_gym_h1_2", 0.479, 0.5}, Walker{"humanoid_gym", 0.454, 0.6},
+                    Walker{"agibot_x1", 0.424, 0.05},
+                    Walker{DUET_SOURCE_DIR "/controllers/arena/rl_sar_gr1t1.yaml", 0.411, 1.0, kGr1T1},
+                    Walker{DUET_SOURCE_DIR "/controllers/arena/rl_sar_gr1t2.yaml", 0.441, 1.0, kGr1T2},
                     Walker{DUET_SOURCE_DIR "/controllers/arena/berkeley_lite.yaml", 0.542, 0.1, kBerkeley},
                     Walker{DUET_SOURCE_DIR "/controllers/arena/berkeley_lite_legs.yaml", 0.454, 0.1, kBerkeley}),
     [](const auto& info) { return std::filesystem::path(info.param.name).stem().string(); });

@@ -91,9 +91,11 @@ INSTANTIATE_TEST_SUITE_P(Robots, DraftOf,
                                          HandMade{"robots/agibot_x1/agibot_x1.yaml", "agibot_x1/agibot_x1.urdf"}),
                          [](const auto& info) { return std::filesystem::path(info.param.card).stem().string(); });
 
-// The maker's description has collision boxes, where ours has no shapes; its base is at the floor.
+// Makers' descriptions have collision shapes, where ours have none; the base of Berkeley's is at the floor.
 INSTANTIATE_TEST_SUITE_P(Shared, DraftOf,
-                         testing::Values(HandMade{"controllers/arena/berkeley_humanoid_lite.yaml",
+                         testing::Values(HandMade{"controllers/arena/gr1t1.yaml", "gr1t1/GR1T1_simple.urdf", true},
+                                         HandMade{"controllers/arena/gr1t2.yaml", "gr1t2/GR1T2_simple.urdf", true},
+                                         HandMade{"controllers/arena/berkeley_humanoid_lite.yaml",
                                                   "berkeley_humanoid_lite/berkeley_humanoid_lite.urdf", true}),
                          [](const auto& info) { return std::filesystem::path(info.param.card).stem().string(); });
 
