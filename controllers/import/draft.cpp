@@ -108,6 +108,7 @@ int joint_of(const RobotModel& robot, const std::string& name) {
 
 DraftBody body_of(const std::vector<std::string>& joints, const std::string& card, const std::string& file) {
   DraftBody best;
+  std::size_t best_same = 0;  // joints that have the very names
   std::string lacks;
   const auto consider = [&](const std::string& name, const std::shared_ptr<const RobotModel>& robot) {
     if (robot == nullptr) return;
@@ -116,7 +117,12 @@ DraftBody body_of(const std::vector<std::string>& joints, const std::string& car
         lacks = joint;
         return;
       }
-    if (best.robot == nullptr || robot->dof() < best.robot->dof()) best = {name, robot};
+    const auto same = static_cast<std::size_t>(std::ranges::count_if(joints, [&](const std::string& joint) {
+      return std::ranges::find(robot->joints, joint, &RobotJoint::name) != robot->joints.end();
+    }));
+    if (best.robot != nullptr && (same < best_same || (same == best_same && robot->dof() >= best.robot->dof()))) return;
+    best = {name, robot};
+    best_same = same;
   };
   if (!card.empty())
     consider(card, load_shared_robot(card_path(card)));
@@ -137,7 +143,12 @@ DraftBody body_of(std::size_t joints, const std::string& card, const std::string
                       robot->joints.size(), card, joints));
     return {card, robot};
   }
-  for (const RobotCardFile& each : robot_cards())
+  std::vector<RobotCardFile> cards = robot_cards();  // those of the robot that stands in first
+  std::stable_partition(cards.begin(), cards.end(),
+                        [folder = cards.empty() ? std::string() : cards.front().folder](const RobotCardFile& each) {
+                          return each.folder == folder;
+                        });
+  for (const RobotCardFile& each : cards)
     if (const auto robot = load_quietly(each.path); robot != nullptr && robot->joints.size() == joints)
       return {each.name, robot};
   throw InputError(

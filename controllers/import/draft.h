@@ -56,10 +56,11 @@ struct TermFacts {
 // The channels of a term under any of its makers' names. Throws InputError with the nearest and all known names.
 DraftTerm draft_term(const std::string& name, const TermFacts& facts, const std::string& file);
 
-// The body of joints under the makers' names: the card asked for, else the first that has all of them, the one with the
-// fewest others. Throws InputError where none has.
+// The body of joints under the makers' names: the card asked for, else of those that have all of them the one with most
+// of the very names, then with the fewest others. Throws InputError where none has.
 DraftBody body_of(const std::vector<std::string>& joints, const std::string& card, const std::string& file);
-// The body of so many joints whose file names none: the card asked for, else the first of as many.
+// The body of so many joints whose file names none: the card asked for, else the first of as many, those of the
+// robot that stands in first.
 DraftBody body_of(std::size_t joints, const std::string& card, const std::string& file);
 // The robot's joint under a maker's name: without case, "_joint", "-" for "_"; -1: none.
 int joint_of(const RobotModel& robot, const std::string& name);
