@@ -32,7 +32,9 @@ class DraftOf : public testing::TestWithParam<HandMade> {
     return robot.shared ? test::shared_file(std::string("arena/") + robot.urdf)
                         : std::string(DUET_SOURCE_DIR) + "/robots/" + robot.urdf;
   }
-  static RobotModel by_hand() { return load_robot(std::string(DUET_SOURCE_DIR) + "/" + GetParam().card); }
+  static RobotModel by_hand() {
+    return load_robot(std::string(DUET_SOURCE_DIR) + "/" + GetParam().card, GetParam().shared ? urdf_path() : "");
+  }
 };
 
 std::vector<std::string> names_of(const RobotModel& robot, const std::vector<int>& joints) {
