@@ -53,7 +53,7 @@ endforeach()
 # What share_file finds (core/share.h): the same folders as in the tree.
 foreach(folder robots controllers policies metrics profiles suites)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_DATADIR}/duet COMPONENT share
-          FILES_MATCHING PATTERN "*.yaml" PATTERN "*.urdf" PATTERN "*.safetensors" PATTERN "test_split.txt")
+          FILES_MATCHING PATTERN "*.yaml" PATTERN "*.urdf" PATTERN "*.safetensors" PATTERN "*.sha256" PATTERN "test_split.txt")
 endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/backends/node DESTINATION ${CMAKE_INSTALL_DATADIR}/duet/backends COMPONENT share
         FILES_MATCHING PATTERN "*.mjs" PATTERN "*.json")

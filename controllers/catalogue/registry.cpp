@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <limits>
+#include <sstream>
 #include <utility>
 
 #include "duet/controllers/controller.h"
@@ -12,6 +13,7 @@
 #include "duet/controllers/vmc.h"
 #include "duet/controllers/wbc_sim/wbc_sim.h"
 #include "duet/core/field.h"
+#include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -270,6 +272,18 @@ Descriptor load_descriptor(const std::string& name) {
   return read_descriptor(share_file("IO descriptor", fmt::format("controllers/descriptors/{}.yaml", name)));
 }
 
+namespace {
+
+// "; SHA-256 0123...", of a published network whose digest is known (controllers/networks.sha256); else "".
+std::string known_digest(const std::string& network) {
+  std::istringstream lines(read_file(share_file("digests of networks", "controllers/networks.sha256")));
+  for (std::string digest, name; lines >> digest >> name;)
+    if (name == network) return fmt::format("; SHA-256 {}", digest);
+  return "";
+}
+
+}  // namespace
+
 std::string find_network(const Descriptor& descriptor, const ControllerOptions& options) {
   const auto given = options.find("network");
   const std::vector<std::string> places =
@@ -277,7 +291,8 @@ std::string find_network(const Descriptor& descriptor, const ControllerOptions& 
   try {
     return first_existing(fmt::format("network of the controller '{}'", descriptor.name), places);
   } catch (const MissingError& error) {
-    throw MissingError(fmt::format("{} (the option 'network' or DUET_MODELS says where it is)", error.what()));
+    throw MissingError(fmt::format("{} (the option 'network' or DUET_MODELS says where it is{})", error.what(),
+                                   given == options.end() ? known_digest(descriptor.network) : ""));
   }
 }
 

@@ -64,7 +64,7 @@ void register_controller(const ControllerInfo& info, ControllerMaker make);
 Descriptor load_descriptor(const std::string& name);
 
 // The file that the option `network` names; else the descriptor's, from its folder (published_places of core/share.h).
-// Throws MissingError naming the places.
+// Throws MissingError naming the places and, where it is known, the network's digest (controllers/networks.sha256).
 std::string find_network(const Descriptor& descriptor, const ControllerOptions& options = {});
 
 // Descriptor and network, loaded once for many controllers, each told a velocity as make_descriptor_controller has it;

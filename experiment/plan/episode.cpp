@@ -105,23 +105,25 @@ EpisodePlan::EpisodePlan(const Suite& suite, const Embodiments& bodies, const Ep
     else
       spec.settings = &settings_.try_emplace(spec.engine, suite.profile.settings(spec.engine)).first->second;
   }
-  for (std::size_t i = 0; i < clips.size(); ++i)
-    if (chosen(part.tasks, to_string(clips[i].task))) clips_.push_back(i);
+  for (std::size_t of = 0; of < combinations_.size(); ++of)
+    for (std::size_t i = 0; i < clips.size(); ++i)
+      if (chosen(part.tasks, to_string(clips[i].task)) && is_run_under(suite, i, combinations_[of]))
+        cells_.push_back({of, i});
   if (!part.is_whole() && size() == 0)
     throw InputError(fmt::format("{}: no episode is in what was asked for", suite.file));
 }
 
 std::int64_t EpisodePlan::size() const {
-  return static_cast<std::int64_t>(combinations_.size() * arms_.size() * clips_.size()) * suite_.episodes_per_clip;
+  return static_cast<std::int64_t>(cells_.size() * arms_.size()) * suite_.episodes_per_clip;
 }
 
 EpisodeSpec EpisodePlan::at(std::int64_t i) const {
-  const auto arms = static_cast<std::int64_t>(arms_.size()), count = static_cast<std::int64_t>(clips_.size());
-  const std::int64_t per_clip = arms * suite_.episodes_per_clip;
+  const auto arms = static_cast<std::int64_t>(arms_.size());
+  const Cell& cell = cells_[i / (arms * suite_.episodes_per_clip)];
   const EpisodeArm& arm = arms_[i % arms];
-  EpisodeSpec spec = combinations_[i / (per_clip * count)];
+  EpisodeSpec spec = combinations_[cell.combination];
   const std::vector<PairedMotion>& clips = bodies_.clips(spec.controller->name);
-  spec.clip = &clips[clips_[i / per_clip % count]];
+  spec.clip = &clips[cell.clip];
   spec.episode = static_cast<int>(i / arms % suite_.episodes_per_clip);
   spec.policy = &arm.policy;
   spec.leader = bodies_.policy(spec.controller->name, arm.policy.name);
@@ -162,6 +164,11 @@ void check_filters(const EpisodeFilter& part, const Suite& suite) {
   check(part.perturbations, suite.perturbation_names(), "perturbation");
 }
 
+bool is_run_under(const Suite& suite, std::size_t clip, const EpisodeSpec& spec) {
+  return !suite.is_commanded() || spec.engine == kPlaybackEngine ||
+         chosen(suite.references.at(clip).perturbations, spec.perturbation->name);
+}
+
 bool belongs(const EpisodeSpec& spec, Task task, const EpisodeFilter& part) {
   return chosen(part.engines, spec.engine) && chosen(part.controllers, spec.controller->name) &&
          (spec.arm == "null" || chosen(part.policies, spec.policy->name)) && chosen(part.tasks, to_string(task)) &&
@@ -176,9 +183,9 @@ std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips,
     for (const EpisodeArm& arm : arms) {
       spec.policy = &arm.policy;
       spec.arm = arm.name;
-      total += std::ranges::count_if(clips, [&](Task task) {
-        return std::ranges::any_of(parts, [&](const EpisodeFilter& part) { return belongs(spec, task, part); });
-      });
+      for (std::size_t i = 0; i < clips.size(); ++i)
+        total += is_run_under(suite, i, spec) &&
+                 std::ranges::any_of(parts, [&](const EpisodeFilter& part) { return belongs(spec, clips[i], part); });
     }
   }
   return total * suite.episodes_per_clip;

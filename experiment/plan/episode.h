@@ -80,7 +80,12 @@ class EpisodePlan {
   std::map<std::string, EngineSettings> settings_;  // by engine
   std::vector<EpisodeSpec> combinations_;           // engine, controller and perturbation alone
   std::vector<EpisodeArm> arms_;
-  std::vector<std::size_t> clips_;  // that are in the part; the same on every body
+  // Each combination with each clip that is in the part and is run under it, by their places; clips are the same on
+  // every body.
+  struct Cell {
+    std::size_t combination = 0, clip = 0;
+  };
+  std::vector<Cell> cells_;
 };
 
 // Whether the choice holds this name; none at all is a choice of every name.
@@ -91,6 +96,9 @@ std::vector<std::string> left_out(const std::vector<std::string>& filter, const 
 
 // Throws std::invalid_argument for a name that the suite does not have: a mistake, not an empty run.
 void check_filters(const EpisodeFilter& part, const Suite& suite);
+
+// Whether the suite's reference of that place is run under what perturbs the episode; a clip is, and so is playback.
+bool is_run_under(const Suite& suite, std::size_t clip, const EpisodeSpec& spec);
 
 // Whether the episode, of a clip of this task, belongs to the part; playback to every choice of perturbations, the null
 // arm to every choice of policies.

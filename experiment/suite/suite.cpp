@@ -210,8 +210,9 @@ const std::vector<std::string>& upper_bodies() {
 }
 
 SuiteReference read_reference(const YAML::Node& node, const std::string& file) {
-  const YamlSection item(file, node, "reference",
-                         {"name", "velocity", "seconds", "begin", "end", "pause", "upper_body", kTagsKey});
+  const YamlSection item(
+      file, node, "reference",
+      {"name", "velocity", "seconds", "begin", "end", "pause", "upper_body", "perturbations", kTagsKey});
   SuiteReference reference;
   reference.velocity = item.vector3("velocity");
   if (reference.velocity.cwiseAbs().maxCoeff() > 10.0)
@@ -226,6 +227,10 @@ SuiteReference read_reference(const YAML::Node& node, const std::string& file) {
   time("pause", 0.0, 600.0, reference.pause);
   read_optional(item, {.name = "upper_body", .choices = upper_bodies()}, reference.upper_body);
   reference.tags = read_tags(item, kOfClip);
+  for (const YAML::Node& node : item.items("perturbations")) {
+    if (!node.IsScalar()) item.refuse_key("perturbations", "names of the suite's perturbations", node);
+    reference.perturbations.push_back(node.Scalar());
+  }
   reference.name = item.has("name") ? item.text("name") : default_name(reference.velocity);
   if (!is_plain_name(reference.name)) item.fail_key("name", plain_name_message(reference.name));
   return reference;
@@ -254,9 +259,13 @@ std::string references_yaml(const std::vector<SuiteReference>& references) {
   for (const SuiteReference& reference : references) {
     const Eigen::Vector3d& v = reference.velocity;
     text += fmt::format(
-        "\n  - {{name: {}, velocity: [{}, {}, {}], seconds: {}, begin: {}, end: {}, pause: {}, upper_body: {}{}}}",
+        "\n  - {{name: {}, velocity: [{}, {}, {}], seconds: {}, begin: {}, end: {}, pause: {}, upper_body: {}{}{}}}",
         reference.name, v.x(), v.y(), v.z(), reference.seconds, reference.begin, reference.end, reference.pause,
-        upper_bodies().at(static_cast<std::size_t>(reference.upper_body)), tags_yaml(reference.tags));
+        upper_bodies().at(static_cast<std::size_t>(reference.upper_body)),
+        reference.perturbations.empty()
+            ? ""
+            : fmt::format(", perturbations: [{}]", fmt::join(reference.perturbations, ", ")),
+        tags_yaml(reference.tags));
   }
   return text;
 }

@@ -86,7 +86,8 @@ struct SuiteReference {
   double begin = 0.0, end = 14.0;                      // when the command holds; else the root stands [s]
   double pause = 0.0;                                  // above 0: on and off in turn, each for so long [s]
   UpperBody upper_body = UpperBody::kStill;
-  Tags tags = {};  // of its rows (core/task.h); they change nothing of an episode
+  std::vector<std::string> perturbations = {};  // the suite's under which it is run; none: all of them
+  Tags tags = {};                               // of its rows (core/task.h); they change nothing of an episode
 
   // Whether the command holds from the first tick to the last.
   [[nodiscard]] bool constant() const { return begin <= 0.0 && end >= seconds && pause <= 0.0; }

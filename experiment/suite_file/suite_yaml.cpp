@@ -41,9 +41,20 @@ void check_commands(const YamlSection& top, const Suite& suite) {
   }
 }
 
+// A reference is run under perturbations that are there.
+void check_references(const YamlSection& top, const Suite& suite) {
+  for (const SuiteReference& reference : suite.references)
+    checked(top, "reference", [&] {
+      for (const std::string& name : reference.perturbations)
+        require(std::ranges::find(suite.perturbations, name, &Perturbation::name) != suite.perturbations.end(),
+                "'{}': {}", reference.name, unknown_name_message("perturbation", name, suite.perturbation_names()));
+    });
+}
+
 // Checks the keys against each other.
 void check_whole(const YamlSection& top, const Suite& suite) {
   if (!suite.references.empty()) check_commands(top, suite);
+  check_references(top, suite);
   check_variants(top, suite);
   const SuiteClips& clips = suite.clips;
   const std::size_t made = clips.synth_per_task * suite.tasks.size() + clips.files.size() * (1 + clips.synth_per_file);

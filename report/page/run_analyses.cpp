@@ -63,6 +63,7 @@ constexpr ListedAnalysis kAnalyses[] = {
     {"people", [](const RunTables& run) { return people_analysis(run.rows); }, Walking::kWritten, true},
     {"trainings", [](const RunTables& run) { return training_analysis(run.rows); }, Walking::kLeftOut, true},
     {"levels", [](const RunTables& run) { return level_analysis(run.rows); }, Walking::kPrinted, true},
+    {"arena", [](const RunTables& run) { return arena_analysis(run.rows); }, Walking::kPrinted, true},
     {"walking", [](const RunTables& run) { return walk_analysis(run.rows); }, Walking::kPrinted, true},
 };
 

@@ -50,6 +50,14 @@ std::optional<double> lead_of(const EpisodeRow& row);
 // also for two names of one level.
 Analysis level_analysis(const std::vector<EpisodeRow>& rows, double level = 0.95);
 
+// How far each controller comes on a ladder of commands, in each engine and under each actuation, best first, and where
+// it fails first: from rows whose suite gives their clip or perturbation the tags `rung` and `rung_name` (the
+// perturbation's counts where both have them); the perturbation's tag `actuation` tells actuations apart. A rung is
+// passed where the lower end of the interval of its episodes is .7 or more; its episodes are draws of the suite's
+// noise, poses and pushes. An episode passes as in level_analysis and, where its clip has the tag `arms: followed`,
+// with the upper body within .2 rad of its reference on average.
+Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level = 0.95);
+
 // Recorded and synthetic people side by side, as rows' tags say: what each policy achieves with the one and with the
 // other, over the tasks that both kinds have. Clean episodes only; the null arm has lines of its own.
 Analysis people_analysis(const std::vector<EpisodeRow>& rows, double level = 0.95);

@@ -35,7 +35,10 @@ int perturbed_link(const std::string& name, const RobotModel& robot) {
 }
 
 std::string named_link(const std::string& name, const RobotModel& robot) {
-  return name.empty() ? robot.frames[robot.roles.push_frame].name : name;
+  if (name.empty()) return robot.frames[robot.roles.push_frame].name;
+  if (std::ranges::find(robot.frames, name, &RobotFrame::name) != robot.frames.end()) return name;
+  const auto track = robot.tracks.find(name);
+  return track == robot.tracks.end() ? name : robot.frames[track->second].name;
 }
 
 Disturbance::Disturbance(const Perturbation& perturbation, const RobotModel& robot, const RobotState& start,

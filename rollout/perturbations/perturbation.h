@@ -53,11 +53,12 @@ class RobotPerturbation {
   [[nodiscard]] virtual std::unique_ptr<RobotAct> begin(const RobotModel&, std::uint64_t) const { return nullptr; }
 };
 
-// The index of the link that a perturbation names; "" names the card's push_link. Throws std::invalid_argument with the
+// The index of the link that a perturbation names: a link or frame, one of the card's tracks ("rhand"), or with "" its
+// push_link. Throws std::invalid_argument with the
 // nearest and all known names.
 int perturbed_link(const std::string& name, const RobotModel& robot);
 
-// The name of the card's push_link where `name` is "".
+// The same as the name of a link or frame; one that is not there stays as it is.
 std::string named_link(const std::string& name, const RobotModel& robot);
 
 // Another law, share of the card's armature or physics step than the profile's (backends/actuation.h); what is none is
@@ -103,7 +104,7 @@ std::vector<Perturbation> read_perturbations(const YamlSection& suite, const std
 // One item of that list with every value written out, on one line.
 std::string to_yaml(const Perturbation& perturbation);
 
-// The perturbation with the card's push_link where no link is named: what a suite's hash is made of.
+// The perturbation with the names of links where none, or a track, is named: what a suite's hash is made of.
 Perturbation with_links(Perturbation perturbation, const RobotModel& robot);
 
 // Throws std::invalid_argument where the robot lacks a link that the perturbation names, or would lose all its mass.

@@ -94,7 +94,7 @@ namespace {
 
 // A mass at the link's centre of mass; the controller keeps the nominal model.
 struct Mass final : RobotPerturbation {
-  std::string link;  // "": the card's push_link
+  std::string link;  // as perturbed_link reads it
   double add = 3.0;  // [kg]; below 0: taken away
 
   [[nodiscard]] std::shared_ptr<const RobotPerturbation> with_links(const RobotModel& robot) const override {
@@ -116,7 +116,9 @@ struct Mass final : RobotPerturbation {
 };
 
 FieldTable<Mass> mass_table() {
-  return {field<Mass>({.name = "link", .meaning = "a link; where there is none the card's push_link"}, &Mass::link),
+  return {field<Mass>(
+              {.name = "link", .meaning = "a link or a track of the card (`rhand`); where there is none its push_link"},
+              &Mass::link),
           field<Mass>({.name = "add",
                        .meaning = "at the link's centre of mass; below 0 it is taken away",
                        .unit = "kg",
@@ -196,7 +198,7 @@ struct Push final : RobotPerturbation {
   double force = 60.0;    // [N]
   double duration = 1.0;  // [s]
   double every = 4.0;     // from begin to begin [s]
-  std::string link;       // "": the card's push_link
+  std::string link;       // as perturbed_link reads it
 
   [[nodiscard]] std::shared_ptr<const RobotPerturbation> with_links(const RobotModel& robot) const override {
     auto bound = std::make_shared<Push>(*this);
@@ -255,7 +257,9 @@ FieldTable<Push> push_table() {
                    .unit = "s",
                    .range = {0.02, 600.0}},
                   &Push::every, &Push::duration),
-      field<Push>({.name = "link", .meaning = "a link; where there is none the card's push_link"}, &Push::link)};
+      field<Push>(
+          {.name = "link", .meaning = "a link or a track of the card (`rhand`); where there is none its push_link"},
+          &Push::link)};
 }
 
 }  // namespace

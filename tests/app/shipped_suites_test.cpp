@@ -153,6 +153,26 @@ TEST(ShippedSuites, TheLevelsOfHardGoUp) {
   }
 }
 
+// Every rung is there under both actuators, and no two of its episodes are the same: what is sensed is noisy.
+TEST(ShippedSuites, TheRungsOfTheArenaAreTheSameUnderBothActuators) {
+  const Suite suite = load_suite(suite_file("arena"));
+  std::map<std::string, std::vector<std::string>> rungs;
+  for (const Perturbation& perturbation : suite.perturbations) {
+    EXPECT_THAT(to_yaml(perturbation), HasSubstr("noise: {q: 0.01, v: 0.2, w: 0.1, gravity: 0.02}"))
+        << perturbation.name;
+    const bool is_explicit = perturbation.actuation.has_value();
+    EXPECT_EQ(perturbation.tags.at("actuation"), is_explicit ? "explicit" : "implicit") << perturbation.name;
+    for (const SuiteReference& reference : suite.references) {
+      const std::vector<std::string>& under = reference.perturbations;
+      if (!under.empty() && std::ranges::find(under, perturbation.name) == under.end()) continue;
+      const Tags& tags = perturbation.tags.contains("rung") ? perturbation.tags : reference.tags;
+      rungs[perturbation.tags.at("actuation")].push_back(tags.at("rung") + " " + tags.at("rung_name"));
+    }
+  }
+  EXPECT_EQ(rungs["implicit"].size(), 7U);
+  EXPECT_EQ(rungs["explicit"], rungs["implicit"]);
+}
+
 TEST(ShippedSuites, FirstSentenceEndsAtAFullStopOrAQuestionMark) {
   EXPECT_EQ(first_sentence("# Who,\n# when? Then more.\nschema: x\n# Later.\n"), "Who, when?");
   EXPECT_EQ(first_sentence("# Version 1.2 of it. More.\n"), "Version 1.2 of it.");

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "duet/execution/runner.h"
+#include "duet/experiment/plan/episode.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/rows/folder/run_directory.h"
 #include "duet/rows/groups/row_groups.h"
@@ -77,6 +78,32 @@ TEST(WalkSuite, WhatHasNoMeaningBesideACommandIsRefusedByItsLine) {
       HasSubstr("clips: expected no such key"));
   EXPECT_THAT(refusal("{velocity: [0.1, 0, 0], begin: 1}", "engines: [playback]\ncontrollers: [homie]\n"),
               HasSubstr("controller 'homie' takes one velocity for the whole episode"));
+}
+
+// A command may be for some of the perturbations alone.
+TEST(WalkSuite, ACommandIsRunUnderThePerturbationsThatItNames) {
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  const std::string more =
+      "engines: [mujoco]\ncontrollers: [pd]\nperturbations: [clean, noise, kick]\n"
+      "episodes_per_clip: 2\n";
+  const Suite walk = suite(
+      "[{velocity: [0, 0, 0], seconds: 0.2, perturbations: [noise]}, "
+      "{velocity: [0.3, 0, 0], seconds: 0.2}]",
+      more);
+  EXPECT_EQ(count_episodes(walk, walk.tasks_of_own_clips(), {EpisodeFilter()}), 2 * (1 + 3));
+  EXPECT_EQ(resolved_yaml(parse_suite(resolved_yaml(walk), "again.yaml")), resolved_yaml(walk));
+  EXPECT_THAT(resolved_yaml(walk), HasSubstr("upper_body: still, perturbations: [noise]}"));
+  const ScratchFolder folder;
+  std::map<std::pair<std::string, std::string>, int> ran;
+  for (const EpisodeRow& row : rows_of(walk, folder / "run")) ++ran[{row.clip, row.perturbation}];
+  EXPECT_THAT(ran, ::testing::ElementsAre(::testing::Pair(::testing::Pair("forward_0.3", "clean"), 2),
+                                          ::testing::Pair(::testing::Pair("forward_0.3", "kick"), 2),
+                                          ::testing::Pair(::testing::Pair("forward_0.3", "noise"), 2),
+                                          ::testing::Pair(::testing::Pair("stand", "noise"), 2)));
+  EXPECT_THAT(refusal("{velocity: [0, 0, 0], perturbations: [nosie]}", more),
+              ::testing::AllOf(HasSubstr("w.yaml:4"), HasSubstr("'stand'"), HasSubstr("did you mean 'noise'?")));
+  EXPECT_THAT(refusal("{velocity: [0, 0, 0], perturbations: [{kick: {speed: 1}}]}", more),
+              HasSubstr("expected names of the suite's perturbations, found a mapping"));
 }
 
 TEST(WalkSuite, ARootThatIsPlayedBackMovesAsItIsCommanded) {

@@ -144,6 +144,8 @@ TEST(Perturbation, ALinkThatIsNotNamedIsTheCards) {
   EXPECT_EQ(g1->links[perturbed_link("", *g1)].name, "torso_link");
   EXPECT_EQ(t1->links[perturbed_link("", *t1)].name, "Trunk");
   EXPECT_EQ(t1->links[perturbed_link("chest_link", *t1)].name, "Trunk");
+  EXPECT_EQ(g1->links[perturbed_link("rhand", *g1)].name, "right_wrist_yaw_link");  // a track of the card
+  EXPECT_EQ(t1->links[perturbed_link("rhand", *t1)].name, "right_hand_link");
   EXPECT_THAT(to_yaml(with_links(default_perturbation("push"), *g1)), HasSubstr("link: torso_link"));
   EXPECT_THAT(to_yaml(with_links(default_perturbation("mass"), *t1)), HasSubstr("link: Trunk"));
   EXPECT_EQ(to_yaml(with_links(default_perturbation("mass"), *g1)), "{name: mass, mass: {link: torso_link, add: 3}}");

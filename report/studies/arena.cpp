@@ -1,0 +1,206 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+#include <tuple>
+
+#include "duet/core/task.h"
+#include "duet/report/ranking/policy_groups.h"
+#include "duet/report/studies/studies.h"
+
+namespace duet {
+namespace {
+
+constexpr double kPass = 0.7;       // the lower end of a rung that is passed: 9 of 9, or 15 of 16
+constexpr double kOfCommand = 0.5;  // of the forward speed that was asked for
+// Mean over joints and time [rad]. In results/published/arena those that follow are off by .04 to .10 as they walk, the
+// others by .23 to .48.
+constexpr double kArmsFollowed = 0.2;
+
+// How an episode ends.
+enum class Trial { kPassed, kFell, kFailed, kSlow, kArmsElsewhere };
+
+constexpr const char* why_not(Trial trial) {
+  switch (trial) {
+    case Trial::kFell:
+      return "falls";
+    case Trial::kSlow:
+      return "does not walk";
+    case Trial::kArmsElsewhere:
+      return "arms elsewhere";
+    case Trial::kFailed:
+      return "ends early";
+    case Trial::kPassed:
+      break;
+  }
+  return "too few episodes";
+}
+
+double metric_or(const EpisodeRow& row, const char* name, double otherwise) {
+  const auto found = row.metrics.find(name);
+  return found == row.metrics.end() ? otherwise : found->second;
+}
+
+// A robot without arms has no error of theirs.
+Trial trial_of(const EpisodeRow& row) {
+  if (row.fell) return Trial::kFell;
+  if (!headline_success(row)) return Trial::kFailed;
+  const double command = metric_or(row, "command_forward", 0.0);
+  if (command > 0.0 && metric_or(row, "speed_forward", 0.0) < kOfCommand * command) return Trial::kSlow;
+  const bool asks_for_arms = row.tags.text(row_tag(kOfClip, "arms")) == "followed";
+  return asks_for_arms && metric_or(row, "upper_body_error", 0.0) > kArmsFollowed ? Trial::kArmsElsewhere
+                                                                                  : Trial::kPassed;
+}
+
+// The rung of a row's perturbation, else of its clip.
+std::optional<std::pair<int, std::string>> rung_of(const EpisodeRow& row) {
+  for (const std::string_view of : {kOfPerturbation, kOfClip}) {
+    const double rung = row.tags.number(row_tag(of, "rung"));
+    if (rung >= 0.0 && rung == std::floor(rung))
+      return std::pair(static_cast<int>(rung), row.tags.text(row_tag(of, "rung_name")));
+  }
+  return std::nullopt;
+}
+
+std::string rung_key(int rung, const std::string& name) { return fmt::format("rung_{}_{}", rung, name); }
+
+std::string rung_title(int rung, std::string name) {
+  std::ranges::replace(name, '_', ' ');
+  return fmt::format("{} {}", rung, name);
+}
+
+using Trials = std::map<Trial, long>;
+
+struct Entry {
+  std::string engine, actuation, controller;
+  auto operator<=>(const Entry&) const = default;
+};
+
+struct Rung {
+  Rate rate;
+  Trial commonest_failure = Trial::kPassed;
+
+  [[nodiscard]] bool passed() const { return rate.n > 0 && rate.interval.low >= kPass; }
+};
+
+struct Standing {
+  Entry entry;
+  std::map<int, Rung> rungs;
+  std::optional<int> reached, fails_at;  // the last rung up to which each is passed; the first that is not
+  long passed = 0;
+  double mean = 0.0;  // over rungs
+};
+
+Rung rung_of_trials(const Trials& trials, double level) {
+  long n = 0, k = 0, most = 0;
+  Rung rung;
+  for (const auto& [trial, count] : trials) {
+    n += count;
+    if (trial == Trial::kPassed) k = count;
+    if (trial == Trial::kPassed || count <= most) continue;
+    most = count;
+    rung.commonest_failure = trial;
+  }
+  rung.rate = {
+      .n = n, .k = k, .rate = static_cast<double>(k) / static_cast<double>(n), .interval = wilson(k, n, level)};
+  return rung;
+}
+
+Standing standing_of(const Entry& entry, const std::map<int, Trials>& trials, double level) {
+  Standing standing{.entry = entry};
+  for (const auto& [number, of_rung] : trials) {
+    const Rung rung = standing.rungs[number] = rung_of_trials(of_rung, level);
+    standing.mean += rung.rate.rate / static_cast<double>(trials.size());
+    standing.passed += rung.passed() ? 1 : 0;
+    if (!rung.passed() && !standing.fails_at) standing.fails_at = number;
+    if (rung.passed() && !standing.fails_at) standing.reached = number;
+  }
+  return standing;
+}
+
+// Best first in each engine and actuation: by the rung that is reached, then by how many are passed at all, then by the
+// mean.
+auto place_of(const Standing& standing) {
+  return std::tuple(standing.entry.engine, standing.entry.actuation, -standing.reached.value_or(-1), -standing.passed,
+                    -standing.mean, standing.entry.controller);
+}
+
+void add_standing(const Standing& standing, const std::map<int, std::string>& names, Estimates& into) {
+  EstimatesOf of{{.engine = standing.entry.engine,
+                  .controller = standing.entry.controller,
+                  .perturbation = standing.entry.actuation},
+                 into};
+  for (const auto& [number, rung] : standing.rungs) {
+    of.keys.of = rung_key(number, names.at(number));
+    of.rate("passes", rung.rate);
+  }
+  of.keys.of = "rung";
+  const auto rungs = static_cast<long>(standing.rungs.size());
+  of.add("mean", rungs, standing.mean);
+  of.count("passed", rungs, standing.passed);
+  if (standing.reached) of.count("reached", rungs, *standing.reached);
+  if (!standing.fails_at) return;
+  const Rung& first = standing.rungs.at(*standing.fails_at);
+  of.word("fails_at", fmt::format("{}: {}", rung_title(*standing.fails_at, names.at(*standing.fails_at)),
+                                  why_not(first.commonest_failure)));
+}
+
+Pivot arena_pivot(const std::map<int, std::string>& names, double level) {
+  Pivot pivot{.title = "Arena",
+              .rows = {{"Engine", &Estimate::engine, true},
+                       {"Actuation", &Estimate::perturbation, true},
+                       {"Controller", &Estimate::controller, true}},
+              .columns = {column("Reached", {.of = "rung", .name = "reached"}, as_count, "none"),
+                          column("Fails first at", {.of = "rung", .name = "fails_at"}, as_word, "nowhere")}};
+  for (const auto& [number, name] : names)
+    pivot.columns.push_back(
+        column(rung_title(number, name), {.of = rung_key(number, name), .name = "passes"}, as_k_of_n));
+  pivot.columns.push_back(column("Mean [%]", {.of = "rung", .name = "mean"}, as_share));
+  pivot.notes = {fmt::format(
+      "Best first in each engine and actuation. An episode passes where the robot is upright at the end, walks at {:g} "
+      "% "
+      "of the speed that it is told or more, and, where its arms are asked for, has them within {:g} rad of where they "
+      "are told on average. Reached: the last rung up to which the lower end of the {:g} % Wilson interval is {:g} % "
+      "or "
+      "more at each. Mean: over the rungs, each counting the same.",
+      100.0 * kOfCommand, kArmsFollowed, 100.0 * level, 100.0 * kPass)};
+  return pivot;
+}
+
+}  // namespace
+
+Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level) {
+  std::map<Entry, std::map<int, Trials>> entries;
+  std::map<int, std::string> names;
+  std::set<std::string> ran, absent;
+  for (const EpisodeRow* row : distinct_episodes(rows)) {
+    const auto rung = rung_of(*row);
+    if (!rung || row->engine == kPlaybackEngine) continue;
+    const bool runs = row->outcome != Outcome::kUnsupported;
+    (runs ? ran : absent).insert(row->controller);
+    if (!runs) continue;
+    const std::string& actuation = row->tags.text(row_tag(kOfPerturbation, "actuation"));
+    ++entries[{row->engine, actuation, row->controller}][rung->first][trial_of(*row)];
+    names.insert(*rung);
+  }
+  Analysis analysis{.name = "arena", .title = "Arena", .level = level, .opens = true};
+  std::vector<Standing> standings;
+  for (const auto& [entry, trials] : entries) standings.push_back(standing_of(entry, trials, level));
+  std::ranges::sort(standings, {}, place_of);
+  for (const Standing& standing : standings) add_standing(standing, names, analysis.estimates);
+  if (analysis.empty()) {
+    analysis.notes = {"No episode of these results stands on a rung."};
+    return analysis;
+  }
+  Pivot pivot = arena_pivot(names, level);
+  std::erase_if(absent, [&](const std::string& controller) { return ran.contains(controller); });
+  if (!absent.empty())
+    pivot.notes.push_back(fmt::format("Not run on this machine, as their rows say: {}.", fmt::join(absent, ", ")));
+  analysis.tables = {table_of(analysis.estimates, pivot)};
+  return analysis;
+}
+
+}  // namespace duet

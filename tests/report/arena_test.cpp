@@ -1,0 +1,119 @@
+#include <gmock/gmock.h>
+
+#include "duet/report/studies/studies.h"
+#include "tests/report/estimates.h"
+#include "tests/report/policy_rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::add_episodes;
+using test::estimate;
+using test::estimates_like;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+struct RungRows {
+  std::string controller, successes;
+  int rung = 1;
+  std::string name = "stands", actuation = "implicit";
+  Tags more = {};
+};
+
+// Adds the rows and gives the place of the first.
+std::size_t add(const RungRows& of, std::vector<EpisodeRow>& rows) {
+  const std::size_t first = rows.size();
+  Tags tags = {
+      {"clip.rung", std::to_string(of.rung)}, {"clip.rung_name", of.name}, {"perturbation.actuation", of.actuation}};
+  tags.merge(Tags(of.more));
+  add_episodes({.policy = "velocity", .perturbation = "calm_" + of.actuation, .successes = of.successes, .tags = tags},
+               rows);
+  for (std::size_t i = first; i < rows.size(); ++i) {
+    rows[i].controller = of.controller;
+    rows[i].clip = of.name;
+    rows[i].key = episode_key(rows[i]);
+  }
+  return first;
+}
+
+const std::string kAll(12, '1');  // a lower end of 76 %
+
+TEST(Arena, RanksByTheRungThatALowerBoundSupports) {
+  std::vector<EpisodeRow> rows;
+  add({.controller = "a", .successes = kAll}, rows);
+  add({.controller = "a", .successes = "111111111110", .rung = 2, .name = "walks"}, rows);  // 11 of 12: from 65 %
+  add({.controller = "a", .successes = kAll, .rung = 3, .name = "pushed"}, rows);
+  add({.controller = "b", .successes = kAll}, rows);
+  add({.controller = "b", .successes = kAll, .rung = 2, .name = "walks"}, rows);
+  add({.controller = "b", .successes = "0000", .rung = 3, .name = "pushed"}, rows);
+  add({.controller = "c", .successes = "0"}, rows);
+  const Analysis analysis = arena_analysis(rows);
+  ASSERT_EQ(analysis.tables.size(), 1U);
+  const TextTable& table = analysis.tables[0].table;
+  EXPECT_THAT(table.header, ElementsAre("Engine", "Actuation", "Controller", "Reached", "Fails first at", "1 stands",
+                                        "2 walks", "3 pushed", "Mean [%]"));
+  ASSERT_EQ(table.rows.size(), 3U);
+  EXPECT_THAT(table.rows[0],
+              ElementsAre("mujoco", "implicit", "b", "2", HasSubstr("3 pushed: "), "12/12", "12/12", "0/4", "66.7"));
+  EXPECT_THAT(table.rows[1],
+              ElementsAre("mujoco", "implicit", "a", "1", HasSubstr("2 walks: "), "12/12", "11/12", "12/12", "97.2"));
+  EXPECT_THAT(table.rows[2],
+              ElementsAre("mujoco", "implicit", "c", "none", HasSubstr("1 stands: "), "0/1", "-", "-", "0.0"));
+  EXPECT_EQ(estimate(analysis, {.controller = "a", .of = "rung", .name = "passed"}).value, 2.0);
+  EXPECT_TRUE(estimates_like(analysis, {.controller = "c", .of = "rung", .name = "reached"}).empty());
+}
+
+TEST(Arena, SaysHowAControllerFailsFirst) {
+  const Tags arms = {{"clip.arms", "followed"}};
+  std::vector<EpisodeRow> rows;
+  for (std::size_t i = add({.controller = "falls", .successes = "000"}, rows); i < rows.size(); ++i)
+    rows[i].fell = true;
+  for (std::size_t i = add({.controller = "stands", .successes = "111"}, rows); i < rows.size(); ++i)
+    rows[i].metrics = {{"command_forward", 0.5}, {"speed_forward", 0.24}, {"upper_body_error", 0.0}};
+  for (std::size_t i = add({.controller = "waves", .successes = "111", .more = arms}, rows); i < rows.size(); ++i)
+    rows[i].metrics = {{"command_forward", 0.5}, {"speed_forward", 0.26}, {"upper_body_error", 0.21}};
+  for (std::size_t i = add({.controller = "free", .successes = kAll}, rows); i < rows.size(); ++i)
+    rows[i].metrics = {{"upper_body_error", 0.21}};  // nobody asks for its arms
+  add({.controller = "few", .successes = "111"}, rows);
+  add({.controller = "armless", .successes = kAll, .more = arms}, rows);
+  const Analysis analysis = arena_analysis(rows);
+  const auto fails = [&](const char* controller) {
+    return estimate(analysis, {.controller = controller, .of = "rung", .name = "fails_at"}).text;
+  };
+  EXPECT_EQ(fails("falls"), "1 stands: falls");
+  EXPECT_EQ(fails("stands"), "1 stands: does not walk");
+  EXPECT_EQ(fails("waves"), "1 stands: arms elsewhere");
+  EXPECT_EQ(fails("few"), "1 stands: too few episodes");
+  for (const char* controller : {"free", "armless"})
+    EXPECT_TRUE(estimates_like(analysis, {.controller = controller, .of = "rung", .name = "fails_at"}).empty());
+  EXPECT_THAT(analysis_markdown(analysis), HasSubstr("nowhere"));
+}
+
+TEST(Arena, APushOutranksItsCommandAndActuationsStandApart) {
+  const Tags pushed = {{"perturbation.rung", "2"}, {"perturbation.rung_name", "pushed"}};
+  std::vector<EpisodeRow> rows;
+  add({.controller = "a", .successes = kAll}, rows);
+  add({.controller = "a", .successes = "0011", .actuation = "explicit", .more = pushed}, rows);
+  const Analysis analysis = arena_analysis(rows);
+  EXPECT_THAT(values_of(analysis.estimates, &Estimate::perturbation), ElementsAre("explicit", "implicit"));
+  EXPECT_EQ(estimate(analysis, {.perturbation = "explicit", .of = "rung_2_pushed", .name = "passes"}).k, 2);
+  EXPECT_EQ(estimate(analysis, {.perturbation = "implicit", .of = "rung_1_stands", .name = "passes"}).k, 12);
+}
+
+TEST(Arena, NamesWhatCouldNotRunAndIsNoTableWithoutRungs) {
+  std::vector<EpisodeRow> rows;
+  add({.controller = "a", .successes = kAll}, rows);
+  for (std::size_t i = add({.controller = "absent", .successes = "000"}, rows); i < rows.size(); ++i)
+    rows[i].outcome = Outcome::kUnsupported;
+  const Analysis analysis = arena_analysis(rows);
+  EXPECT_EQ(analysis.tables.at(0).table.rows.size(), 1U);
+  EXPECT_THAT(analysis_markdown(analysis), HasSubstr("Not run on this machine, as their rows say: absent."));
+  std::vector<EpisodeRow> plain;
+  add_episodes({.successes = "11"}, plain);
+  EXPECT_TRUE(arena_analysis(plain).empty());
+  EXPECT_TRUE(arena_analysis({}).tables.empty());
+}
+
+}  // namespace
+}  // namespace duet
