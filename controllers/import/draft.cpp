@@ -25,7 +25,7 @@ const std::vector<TermRow>& term_table() {
       {"base_lin_vel lin_vel", {"base_linear_velocity"}},
       {"base_ang_vel ang_vel imu_ang_vel", {"base_angular_velocity"}},
       {"projected_gravity gravity_vec", {"projected_gravity"}},
-      {"velocity_commands commands", {"command_velocity"}},
+      {"velocity_commands keyboard_velocity_commands commands", {"command_velocity"}},
       {"command_lin_vel", {"command_velocity, axes: [0, 1]"}},
       {"command_ang_vel", {"command_velocity, axes: [2]"}},
       {"command_base_height", {"command_height"}},

@@ -209,6 +209,15 @@ TEST_F(ImportTest, OfALabsDeploymentPutsItsMotorsInTheNetworksOrder) {
   EXPECT_EQ(parse_descriptor(by_frames.text, "deploy.yaml").observation.inputs[0].parts.size(), 1U);
 }
 
+TEST_F(ImportTest, OfALabsDeploymentTakesItsCommandFromAKeyboardToo) {
+  std::string text = lab_yaml();
+  text.replace(text.find("base_ang_vel"), 12, "keyboard_velocity_commands");
+  write("policy.onnx", network(34, 12, {}));
+  const ImportedDescriptor made = imported({.file = write("deploy.yaml", text), .robot = "t1_12dof"});
+  const Descriptor d = parse_descriptor(made.text, "deploy.yaml");
+  EXPECT_EQ(d.observation.groups[0].channels[0].kind, ChannelKind::kCommandVelocity);
+}
+
 TEST_F(ImportTest, OfRlSarTakesNamesAndRateFromTheRobotsFile) {
   std::filesystem::create_directories(folder / "policy");
   write("base.yaml", "robot: {dt: 0.005, decimation: 2, joint_names: " +
