@@ -319,37 +319,20 @@ def body_of(controller):
     return "g1"
 
 
-def arena(folder, engine=None, actuation=None):
-    """The board of an engine and actuation, best first; without them the rung that each controller reaches in all of them, and where it fails first."""
-    file, rows = f"{folder}/arena.csv", rows_of(folder, "arena.csv")
-    rungs = {r["of"]: " ".join(r["of"].split("_")[1:]) for r in sorted(rows, key=lambda r: r["of"]) if r["name"] == "passes"}
-
-    def value(**keys):
-        found = [r for r in rows if all(r[key] == wanted for key, wanted in keys.items())]
-        return found[0] if found else None
-
-    def reached(of):
-        most, fails = value(**of, name="reached"), value(**of, name="fails_at")
-        return (f"**{float(most['value']):.0f}**" if most else "**none**"), fails["text"] if fails else "nowhere"
-
-    table = []
-    if engine:
-        here = [r["controller"] for r in rows if (r["engine"], r["perturbation"], r["name"]) == (engine, actuation, "mean")]
-        if not here:
-            raise Refused(f"{file} has no row of {engine}, {actuation}")
-        for controller in here:
-            of = {"engine": engine, "perturbation": actuation, "controller": controller}
-            cells = [value(**of, name="passes", of=rung) for rung in rungs]
-            table.append([f"`{controller}`", f"`{body_of(controller)}`", *reached(of), *[f"{r['k']}/{r['n']}" if r else "-" for r in cells]])
-        return markdown(["Controller", "Body", "Reached", "Fails first at", *rungs.values()], [False] * 4 + [True] * len(rungs), table)
-    columns = sorted({(r["engine"], r["perturbation"]) for r in rows}, key=lambda of: (list(WORLDS).index(of[0]), of[1] != "implicit"))
-    for controller in dict.fromkeys(r["controller"] for r in rows if (r["engine"], r["perturbation"]) == columns[0]):
-        cells = []
-        for of in columns:
-            most, fails = reached({"engine": of[0], "perturbation": of[1], "controller": controller})
-            cells.append(f"{most}; {fails}" if value(engine=of[0], perturbation=of[1], controller=controller) else "-")
-        table.append([f"`{controller}`", *cells])
-    return markdown(["Controller", *[f"{WORLDS[of[0]]}, {of[1]}" for of in columns]], [False] * (1 + len(columns)), table)
+def arena(folder, engine, actuation):
+    """The board of an engine and actuation, best first: the rung that each controller reaches, where it fails first, and how many episodes pass at each."""
+    rows = [r for r in rows_of(folder, "arena.csv") if (r["engine"], r["perturbation"]) == (engine, actuation)]
+    if not rows:
+        raise Refused(f"{folder}/arena.csv has no row of {engine}, {actuation}")
+    rungs, table = sorted({r["of"] for r in rows if r["name"] == "passes"}), []
+    for controller in dict.fromkeys(r["controller"] for r in rows):
+        of = {(r["of"], r["name"]): r for r in rows if r["controller"] == controller}
+        most, fails = of.get(("rung", "reached")), of.get(("rung", "fails_at"))
+        cells = [of.get((rung, "passes")) for rung in rungs]
+        table.append([f"`{controller}`", f"`{body_of(controller)}`", f"**{float(most['value']):.0f}**" if most else "**none**",
+                      fails["text"] if fails else "nowhere", *[f"{r['k']}/{r['n']}" if r else "-" for r in cells]])
+    titles = [" ".join(rung.split("_")[1:]) for rung in rungs]
+    return markdown(["Controller", "Body", "Reached", "Fails first at", *titles], [False] * 4 + [True] * len(rungs), table)
 
 
 def suites(program):
@@ -381,7 +364,7 @@ def contents(source, program):
         return actuation_walkers(words[1], program)
     if words[:1] in (["own_worlds"], ["own_worlds_paired"]) and len(words) > 2:
         return (own_worlds if words[0] == "own_worlds" else own_worlds_paired)(*words[1:])
-    if words[:1] == ["arena"] and len(words) in (2, 4):
+    if words[:1] == ["arena"] and len(words) == 4:
         return arena(*words[1:])
     if words[:1] == ["people"] and len(words) == 3:
         return people(*words[1:])
@@ -389,7 +372,7 @@ def contents(source, program):
               "actuation": actuation}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER [ENGINE ACTUATION], pictures FILE, actuation RUN, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER ENGINE ACTUATION, pictures FILE, actuation RUN, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):

@@ -11,6 +11,7 @@
 #include "duet/core/require.h"
 #include "duet/execution/missing_tags.h"
 #include "duet/report/page/run_analyses.h"
+#include "duet/report/studies/studies.h"
 #include "duet/rows/folder/run_directory.h"
 
 namespace duet {
@@ -71,6 +72,12 @@ TEST_P(PublishedTables, AreWhatTheRowsSay) {
 INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables,
                          testing::Values("policies", "sealed", "sealed_varied", "interaction", "lead", "real"),
                          [](const auto& info) { return std::string(info.param); });
+
+// The others of its tables are long, and nothing is quoted from them.
+TEST(PublishedArena, ItsBoardIsWhatTheRowsSay) {
+  const Analysis board = arena_analysis(load_run(in("published/arena")).rows);
+  EXPECT_EQ(lines_of(read_file(in("tables/arena/arena.csv"))), lines_of(analysis_csv(board)));
+}
 
 }  // namespace
 }  // namespace duet

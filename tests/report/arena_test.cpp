@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "duet/report/studies/studies.h"
@@ -11,6 +12,7 @@ namespace {
 using test::add_episodes;
 using test::estimate;
 using test::estimates_like;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -82,7 +84,7 @@ TEST(Arena, SaysHowAControllerFailsFirst) {
     return estimate(analysis, {.controller = controller, .of = "rung", .name = "fails_at"}).text;
   };
   EXPECT_EQ(fails("falls"), "1 stands: falls");
-  EXPECT_EQ(fails("stands"), "1 stands: does not walk");
+  EXPECT_EQ(fails("stands"), "1 stands: too slow");
   EXPECT_EQ(fails("waves"), "1 stands: arms elsewhere");
   EXPECT_EQ(fails("few"), "1 stands: too few episodes");
   for (const char* controller : {"free", "armless"})
@@ -106,9 +108,16 @@ TEST(Arena, NamesWhatCouldNotRunAndIsNoTableWithoutRungs) {
   add({.controller = "a", .successes = kAll}, rows);
   for (std::size_t i = add({.controller = "absent", .successes = "000"}, rows); i < rows.size(); ++i)
     rows[i].outcome = Outcome::kUnsupported;
+  for (std::size_t i = add({.controller = "broken", .successes = "000"}, rows); i < rows.size(); ++i) {
+    rows[i].outcome = Outcome::kError;
+    rows[i].message = fmt::format("no {}", i);
+  }
   const Analysis analysis = arena_analysis(rows);
-  EXPECT_EQ(analysis.tables.at(0).table.rows.size(), 1U);
-  EXPECT_THAT(analysis_markdown(analysis), HasSubstr("Not run on this machine, as their rows say: absent."));
+  EXPECT_EQ(analysis.tables.at(0).table.rows.size(), 2U);
+  EXPECT_EQ(estimate(analysis, {.controller = "broken", .of = "rung", .name = "fails_at"}).text, "1 stands: error");
+  EXPECT_THAT(analysis_markdown(analysis),
+              AllOf(HasSubstr("Not run on this machine, as their rows say: absent."),
+                    HasSubstr("broken: 3 episodes ended with an error, the first: no 15")));
   std::vector<EpisodeRow> plain;
   add_episodes({.successes = "11"}, plain);
   EXPECT_TRUE(arena_analysis(plain).empty());
