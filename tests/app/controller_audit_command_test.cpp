@@ -78,6 +78,9 @@ TEST(ControllerAudit, EndsWithFourForWhatIsNotThere) {
   const Answer network = duet_program("controller audit gmt", "DUET_SHARED= DUET_MODELS=");
   EXPECT_EQ(network.code, 4);
   EXPECT_THAT(network.err, HasSubstr("no network of the controller 'gmt'"));
+  const Answer known = duet_program("controller audit homie", "DUET_SHARED= DUET_MODELS=");
+  EXPECT_EQ(known.code, 4);
+  EXPECT_THAT(known.err, HasSubstr("; SHA-256 afe6363c83c8b9ab8b1a2fed598fce7de35ff045eee1a95b336fd6720e3d3d49)"));
   const Answer descriptor = duet_program("controller audit gmtt");
   EXPECT_EQ(descriptor.code, 4);
   EXPECT_THAT(descriptor.err, HasSubstr("no IO descriptor"));
