@@ -138,8 +138,8 @@ inline constexpr int kMostExtended = 8;
 // keys stand where the card has none. Throws InputError as YamlSection does, and for a cycle, naming both files.
 RobotCard parse_card(const std::string& text, const std::string& file);
 
-// The URDF of a card: beside it, or, where that may not be passed on, where files of others are. The first place where
-// it is nowhere.
+// The URDF of a card: beside it, or, where that may not be passed on, where files of others are. Throws MissingError
+// where it is nowhere.
 std::string urdf_of(const std::string& card_path, const RobotCard& card);
 
 // A sentence on the <dynamics> of the joints that the robot moves, which is not simulated; "" where it has none.

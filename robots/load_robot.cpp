@@ -400,7 +400,10 @@ std::string urdf_of(const std::string& card_path, const RobotCard& card) {
   std::error_code ignored;
   for (const std::string& place : places)
     if (std::filesystem::exists(place, ignored)) return place;
-  return places.front();
+  throw MissingError(
+      fmt::format("{}: the description '{}' is absent (it is looked for beside the card, in $DUET_MODELS and in "
+                  "$DUET_SHARED/models and $DUET_SHARED/arena)",
+                  card_path, card.urdf));
 }
 
 RobotModel load_robot(const std::string& card_path, const std::string& urdf_path) {

@@ -154,10 +154,10 @@ struct RobotModel {
 void require_made_for(const std::string& made_for, const RobotModel& robot, const std::string& file);
 
 // Loads a card, the cards that it extends, and the URDF it names (relative to the card; `urdf_path`, where given,
-// replaces it). Meshes need not exist. Throws InputError naming file, element, expected and found: no or a broken URDF,
-// a cycle or two roots, a joint that is neither revolute nor fixed (continuous is taken as +-2 pi), a joint of the card
-// that the URDF lacks or the other way round, unknown keys of the card, a role that names no joint of it, values that
-// are not finite or out of range (mass <= 0, lower > upper, ...).
+// replaces it). Meshes need not exist. Throws MissingError where the card's URDF is nowhere; InputError with file,
+// element, expected and found: a broken URDF, a cycle or two roots, a joint that is neither revolute nor fixed
+// (continuous is taken as +-2 pi), a joint of card or URDF that the other lacks, unknown keys of the card, a role that
+// names no joint of it, values that are not finite or out of range (mass <= 0, lower > upper, ...).
 RobotModel load_robot(const std::string& card_path, const std::string& urdf_path = "");
 
 // The card that stands in where none is named: robots/g1/g1.yaml (robots/robot_cards.h says where it is looked for).

@@ -88,9 +88,10 @@ void require_bearable_law(const Suite& suite) {
       driven.emplace_back(engine, suite.profile.settings(engine));
   if (driven.empty()) return;
   for (const SuiteController& controller : suite.controllers) {
-    const std::shared_ptr<const RobotModel> robot = load_shared_robot(suite.card_of(controller));
+    std::shared_ptr<const RobotModel> robot;
     JointGains gains;
     try {
+      robot = load_shared_robot(suite.card_of(controller));
       gains = standing_gains(*make_controller(controller.use, robot, controller.options), *robot);
     } catch (const MissingError&) {
       continue;

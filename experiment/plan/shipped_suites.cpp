@@ -15,6 +15,7 @@
 #include "duet/core/share.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/plan/run_identity.h"
+#include "duet/robots/robot_model.h"
 #include "duet/robots/yaml_section.h"
 #include "duet/rows/folder/run_info.h"
 
@@ -114,6 +115,8 @@ std::string shipped_suite_note(const RunInfo& info) {
   try {
     const std::optional<Suite> shipped = suite_that_ships(info.suite);
     if (!shipped) return "";
+    for (const SuiteController& controller : shipped->controllers)  // where a robot is absent nothing can be said
+      (void)load_shared_robot(shipped->card_of(controller));
     const bool same = !shipped->clips.given && suite_hash(*shipped) == info.suite_hash;
     return fmt::format("{} ({})", same ? "as it ships" : difference_note(*shipped, info),
                        excerpt(short_digest(info.suite_hash)));

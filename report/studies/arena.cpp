@@ -113,7 +113,8 @@ Rung rung_of_trials(const Trials& trials, double level) {
 }
 
 Standing standing_of(const Entry& entry, const std::map<int, Trials>& trials, double level) {
-  Standing standing{.entry = entry};
+  Standing standing;
+  standing.entry = entry;
   for (const auto& [number, of_rung] : trials) {
     const Rung rung = standing.rungs[number] = rung_of_trials(of_rung, level);
     standing.mean += rung.rate.rate / static_cast<double>(trials.size());

@@ -296,7 +296,8 @@ class CardWriter {
 
   [[nodiscard]] static Sole around(const std::vector<Eigen::Vector3d>& points) {
     constexpr double kNearGround = 0.03;  // [m]
-    Sole sole{.low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity()), .high = {}};
+    Sole sole;
+    sole.low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
     sole.high = -sole.low;
     sole.ground = std::ranges::min(points, {}, [](const Eigen::Vector3d& p) { return p.z(); }).z();
     for (const Eigen::Vector3d& p : points) {

@@ -2,6 +2,8 @@
 // for what is not there.
 #include <gmock/gmock.h>
 
+#include <filesystem>
+
 #include "tests/app/program.h"
 #include "tests/backends/engine_names.h"
 
@@ -33,7 +35,9 @@ class ControllerAuditCommand : public ::testing::Test {
   // The audit of a file `mine.yaml` of this text.
   [[nodiscard]] Answer audit(const std::string& text, const std::string& more = "") const {
     write_file(folder_ / "mine.yaml", text);
-    return duet_program("controller audit mine.yaml " + more, "cd " + (folder_ / "") + ";");
+    const std::string models = std::filesystem::path(test::shared_file(kNetwork)).parent_path().string();
+    return duet_program("controller audit mine.yaml " + more,
+                        "cd " + (folder_ / "") + "; DUET_MODELS='" + models + "'");
   }
 
   test::ScratchFolder folder_;

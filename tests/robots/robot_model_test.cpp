@@ -78,8 +78,10 @@ TEST(LoadRobot, UrdfByPathReplacesTheCards) {
   write_file(folder / "card.yaml", test::replaced(test::kSmallCard, "small.urdf", "absent.urdf"));
   write_file(folder / "other.urdf", test::kSmallUrdf);
   EXPECT_EQ(load_robot(folder / "card.yaml", folder / "other.urdf").dof(), 2);
-  EXPECT_EQ(thrown_message<InputError>([&] { load_robot(folder / "card.yaml"); }),
-            "cannot read '" + folder / "absent.urdf" + "': No such file or directory");
+  EXPECT_EQ(thrown_message<MissingError>([&] { load_robot(folder / "card.yaml"); }),
+            folder / "card.yaml" +
+                ": the description 'absent.urdf' is absent (it is looked for beside the card, in $DUET_MODELS and in "
+                "$DUET_SHARED/models and $DUET_SHARED/arena)");
   EXPECT_EQ(thrown_message<InputError>([&] { load_robot(folder / "no.yaml"); }),
             "cannot read '" + folder / "no.yaml" + "': No such file or directory");
 }
