@@ -106,6 +106,49 @@ TEST(HwCommand, ADryRunOfATwinIsReadyAndItsLogIsTheSameAgain) {
   EXPECT_THAT(replay.out, HasSubstr("\"different\": 0"));
 }
 
+// A dry run tells its status, and leaves a log that a report is made of.
+TEST(HwCommand, StatusAndReportOfADryRun) {
+  const test::ScratchFolder folder;
+  write_file(folder / "twin.yaml", config_of());
+  const std::string dry = std::string(DUET_PROGRAM) + " hw dry-run --seconds 5 --socket " + (folder / "guard") +
+                          " --log " + (folder / "run.mcap") + " " + (folder / "twin.yaml") + " >/dev/null 2>&1 & ";
+  const Answer status =
+      duet_program("hw status --json --socket " + (folder / "guard"), twin_command("8") + dry + "sleep 3; ");
+  EXPECT_EQ(status.code, 0) << status.err;
+  EXPECT_THAT(status.out, HasSubstr("\"state_age\""));
+  EXPECT_THAT(status.out, HasSubstr("\"next\""));
+  std::this_thread::sleep_for(std::chrono::seconds(4));  // the dry run's end
+  const Answer report =
+      duet_program("hw report " + (folder / "run.mcap") + " --format md,json -o " + (folder / "debriefing"));
+  EXPECT_EQ(report.code, 0) << report.err;
+  EXPECT_THAT(report.out, HasSubstr("the log is whole"));
+  EXPECT_THAT(report.out, HasSubstr("| ready "));
+  EXPECT_THAT(read_file(folder / "debriefing/log.json"), HasSubstr("\"duet.analysis/1\""));
+  EXPECT_THAT(read_file(folder / "debriefing/log.md"), HasSubstr("States"));
+}
+
+TEST(HwCommand, StatusAndReportSayWhatIsMissing) {
+  const test::ScratchFolder folder;
+  const Answer status = duet_program("hw status --socket " + (folder / "nobody"));
+  EXPECT_EQ(status.code, 4);
+  EXPECT_THAT(status.err, HasSubstr("no guard tells its status at"));
+  write_file(folder / "text", "text");
+  const Answer report = duet_program("hw report " + (folder / "text"));
+  EXPECT_EQ(report.code, 2);
+  EXPECT_THAT(report.err, HasSubstr("expected an MCAP file"));
+  const Answer format = duet_program("hw report " + (folder / "text") + " --format html");
+  EXPECT_EQ(format.code, 2);
+  EXPECT_THAT(format.err, HasSubstr("unknown format 'html'"));
+}
+
+TEST(HwCommand, ReplayRefusesWhatIsNoLog) {
+  const test::ScratchFolder folder;
+  write_file(folder / "text", "text");
+  const Answer answer = duet_program("replay-log " + (folder / "text"));
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_THAT(answer.err, HasSubstr("expected an MCAP file"));
+}
+
 // Somebody `ahead` of the camera of examples/hardware/camera.yaml, for two seconds.
 std::string person_at(double ahead, const test::ScratchFolder& folder) {
   std::vector<RecordedEstimate> log;
@@ -164,49 +207,6 @@ TEST(HwCommand, CalibratePrintsTheCameraOrSaysWhatIsMissing) {
   EXPECT_THAT(still.out, HasSubstr("camera:\n  position: ["));
   EXPECT_THAT(still.out, HasSubstr("standard errors: position"));
   EXPECT_THAT(still.out, HasSubstr("not good: expected a residual of at most 0.1 m"));
-}
-
-// A dry run tells its status, and leaves a log that a report is made of.
-TEST(HwCommand, StatusAndReportOfADryRun) {
-  const test::ScratchFolder folder;
-  write_file(folder / "twin.yaml", config_of());
-  const std::string dry = std::string(DUET_PROGRAM) + " hw dry-run --seconds 5 --socket " + (folder / "guard") +
-                          " --log " + (folder / "run.mcap") + " " + (folder / "twin.yaml") + " >/dev/null 2>&1 & ";
-  const Answer status =
-      duet_program("hw status --json --socket " + (folder / "guard"), twin_command("8") + dry + "sleep 3; ");
-  EXPECT_EQ(status.code, 0) << status.err;
-  EXPECT_THAT(status.out, HasSubstr("\"state_age\""));
-  EXPECT_THAT(status.out, HasSubstr("\"next\""));
-  std::this_thread::sleep_for(std::chrono::seconds(4));  // the dry run's end
-  const Answer report =
-      duet_program("hw report " + (folder / "run.mcap") + " --format md,json -o " + (folder / "debriefing"));
-  EXPECT_EQ(report.code, 0) << report.err;
-  EXPECT_THAT(report.out, HasSubstr("the log is whole"));
-  EXPECT_THAT(report.out, HasSubstr("| ready "));
-  EXPECT_THAT(read_file(folder / "debriefing/log.json"), HasSubstr("\"duet.analysis/1\""));
-  EXPECT_THAT(read_file(folder / "debriefing/log.md"), HasSubstr("States"));
-}
-
-TEST(HwCommand, StatusAndReportSayWhatIsMissing) {
-  const test::ScratchFolder folder;
-  const Answer status = duet_program("hw status --socket " + (folder / "nobody"));
-  EXPECT_EQ(status.code, 4);
-  EXPECT_THAT(status.err, HasSubstr("no guard tells its status at"));
-  write_file(folder / "text", "text");
-  const Answer report = duet_program("hw report " + (folder / "text"));
-  EXPECT_EQ(report.code, 2);
-  EXPECT_THAT(report.err, HasSubstr("expected an MCAP file"));
-  const Answer format = duet_program("hw report " + (folder / "text") + " --format html");
-  EXPECT_EQ(format.code, 2);
-  EXPECT_THAT(format.err, HasSubstr("unknown format 'html'"));
-}
-
-TEST(HwCommand, ReplayRefusesWhatIsNoLog) {
-  const test::ScratchFolder folder;
-  write_file(folder / "text", "text");
-  const Answer answer = duet_program("replay-log " + (folder / "text"));
-  EXPECT_EQ(answer.code, 2);
-  EXPECT_THAT(answer.err, HasSubstr("expected an MCAP file"));
 }
 
 }  // namespace
