@@ -17,7 +17,7 @@ constexpr std::size_t kStampAt = 16;  // in a message
 
 std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text)); }
 
-// Of the message that begins here; 0 where none does.
+// The size of the message that begins here; 0 where none does.
 std::size_t length_of(std::string_view bytes) {
   if (bytes.starts_with("DPJ2")) return kPersonBytes;
   return bytes.starts_with("DPJ1") ? kFirstPersonBytes : 0;

@@ -24,7 +24,7 @@ std::vector<RecordedEstimate> read_person_log(const std::string& path);
 RecordedEstimate recorded(const PersonEstimate& estimate);
 std::string person_log(std::span<const RecordedEstimate> estimates);
 
-// What becomes of each by itself, without an order among them.
+// The fate of each by itself, without an order among them.
 PersonCounts counts_of(std::span<const RecordedEstimate> estimates);
 
 }  // namespace duet

@@ -85,7 +85,7 @@ class LimbFinder {
     return -1;
   }
 
-  // Of a robot whose sides mirror one another.
+  // For a robot whose sides mirror one another.
   [[nodiscard]] double middle() const {
     double sum = 0.0;
     int hinges = 0;

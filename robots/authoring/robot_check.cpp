@@ -21,7 +21,7 @@ namespace {
 constexpr double kOfABody = 1e-3;                             // share by which principal moments may miss a body's
 constexpr std::pair<double, double> kGyration = {1e-3, 2.0};  // radii of gyration of a part of a humanoid [m]
 
-// What a card and a URDF that are each whole say of one another.
+// Holds a card against a URDF, each whole by itself.
 class CardAgainstUrdf {
  public:
   CardAgainstUrdf(const RobotCard& card, const UrdfModel& urdf) : urdf_(urdf) {

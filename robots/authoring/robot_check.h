@@ -1,4 +1,4 @@
-// What a run will need of a robot card, looked at before the first episode: what the card and its URDF say of one
+// The needs of a run from a robot card, looked at before the first episode: what the card and its URDF say of one
 // another, and what the robot that they make tells of itself. `duet robot check`. Thread-safe.
 #pragma once
 

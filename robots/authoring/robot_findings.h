@@ -1,4 +1,4 @@
-// What a robot that loads tells of itself before a run: heights, soles, balance, roles, gains, limits, with figures
+// Findings about a robot that loads, before a run: heights, soles, balance, roles, gains, limits, with figures
 // and, where something is missing or contradicts itself, the next step. Thread-safe.
 #pragma once
 

@@ -6,7 +6,7 @@
 
 namespace duet {
 
-// What Adam, the running average and a checkpoint hold, on the host.
+// The numbers that Adam, the running average and a checkpoint hold, on the host.
 struct LearningState {
   WeightBlock weights, average;
   std::vector<float> m, v;  // moments of the gradient
@@ -31,7 +31,6 @@ class DeviceNetwork {
  public:
   DeviceNetwork(const LearningState& state, torch::Device device);
 
-  [[nodiscard]] torch::Device device() const { return weights_.device(); }
   [[nodiscard]] const Weights& leaves() const { return leaves_; }  // gather gradients
   [[nodiscard]] Weights average() const;
   void apply(const AdamStep& step);  // and clears the gradients

@@ -161,7 +161,7 @@ class Trainer {
   int stale = 0;  // validations since the best one
 
  private:
-  // What one thread works on: its share of each batch.
+  // One thread's work: its share of each batch.
   struct Lane {
     Lane(const DstarData& data, const DstarRun& run)
         : weights(run.config),
