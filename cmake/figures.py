@@ -335,6 +335,31 @@ def arena(folder, engine, actuation):
     return markdown(["Controller", "Body", "Reached", "Fails first at", *titles], [False] * 4 + [True] * len(rungs), table)
 
 
+def arena_order(*boards):
+    """The networks that a public benchmark ran, too, in its order, beside the boards (FOLDER:ACTUATION, of MuJoCo): the rung reached and the mean over rungs;
+    last, how far the orders agree."""
+    header, columns, survival = ["Network", "upright there [s of 90]"], [], {}
+    for board in boards:
+        folder, actuation = board.split(":")
+        rows = rows_of(folder, "arena.csv")
+        survival = {r["controller"]: float(r["value"]) for r in rows if r["name"] == "survival"}
+        here = [r for r in rows if (r["engine"], r["perturbation"]) == ("mujoco", actuation)]
+        header.append(f"`{folder.rpartition('/')[2]}`, {actuation}: reached, mean [%]")
+        columns.append(here)
+    table = []
+    for network, seconds in sorted(survival.items(), key=lambda item: -item[1]):
+        cells = []
+        for here in columns:
+            of = {r["name"]: r for r in here if r["controller"] == network and r["of"] == "rung"}
+            cells.append(f"{of['reached']['text'] or of['reached']['value'] if 'reached' in of else 'none'}, {percent(of['mean']['value'])}" if of else "-")
+        table.append([f"`{network}`", f"{seconds:.1f}", *cells])
+    def agreement(here):
+        tau, swapped = (figure(here, "arena.csv", of="public_order", name=name) for name in ("tau_b", "swapped"))
+        return f"{float(tau['value']):.2f} [{float(tau['low']):.2f}, {float(tau['high']):.2f}]; {swapped['value']} of {swapped['n']}"
+    table.append(["Kendall's tau-b with the order there; pairs swapped", "1", *[agreement(here) for here in columns]])
+    return markdown(header, [False] + [True] * (1 + len(columns)), table)
+
+
 def suites(program):
     """The suites that ship, what each asks, and whether its rows are published."""
     found = json.loads(output([program, "list", "suites", "--json"]))
@@ -366,13 +391,15 @@ def contents(source, program):
         return (own_worlds if words[0] == "own_worlds" else own_worlds_paired)(*words[1:])
     if words[:1] == ["arena"] and len(words) == 4:
         return arena(*words[1:])
+    if words[:1] == ["arena_order"] and len(words) > 1:
+        return arena_order(*words[1:])
     if words[:1] == ["people"] and len(words) == 3:
         return people(*words[1:])
     tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
               "actuation": actuation}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER ENGINE ACTUATION, pictures FILE, actuation RUN, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER ENGINE ACTUATION, arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):

@@ -10,6 +10,7 @@
 
 #include "duet/controllers/controller.h"
 #include "duet/controllers/descriptor_controller.h"
+#include "duet/controllers/reference_arms.h"
 #include "duet/controllers/vmc.h"
 #include "duet/controllers/wbc_sim/wbc_sim.h"
 #include "duet/core/field.h"
@@ -27,6 +28,7 @@ using Robot = std::shared_ptr<const RobotModel>;
 // Options of every controller beside its own.
 struct CommonOptions {
   double explicit_step = 0.0;  // 0: as the controller has it
+  bool reference_arms = false;
 };
 
 const FieldTable<CommonOptions>& common_table() {
@@ -35,7 +37,12 @@ const FieldTable<CommonOptions>& common_table() {
                             .meaning = "physics step [s] at which an explicit PD law without rotor inertia has to "
                                        "hold: lowers kd of the joints that would shake there (0: none)",
                             .range = {0.0, 0.02}},
-                           &CommonOptions::explicit_step)};
+                           &CommonOptions::explicit_step),
+      field<CommonOptions>({.name = "arms",
+                            .meaning = "reference: the arms follow the reference whatever the controller answers for "
+                                       "them, as where something else moves them",
+                            .choices = {"own", "reference"}},
+                           &CommonOptions::reference_arms)};
   return table;
 }
 
@@ -217,7 +224,11 @@ LoadedController load_controller(const std::string& name, const std::shared_ptr<
   const Entry& entry = find_entry(name);
   check_controller_options(entry.info(name), options);
   const CommonOptions common = read_options("controller", name, common_table(), part_of(options, false));
-  const LoadedController loaded = entry.load(name, robot, part_of(options, true));
+  LoadedController loaded = entry.load(name, robot, part_of(options, true));
+  if (common.reference_arms)
+    loaded.make = [robot, make = loaded.make](const ControllerOptions& now) {
+      return make_reference_arms(make(now), *robot);
+    };
   LoadedController guarded = {[robot, make = loaded.make](const ControllerOptions& now) {
                                 return make_guarded(make(part_of(now, true)), robot);
                               },

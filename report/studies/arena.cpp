@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <tuple>
 
+#include "duet/core/numbers.h"
 #include "duet/core/task.h"
 #include "duet/report/ranking/policy_groups.h"
 #include "duet/report/studies/studies.h"
@@ -125,11 +128,14 @@ Standing standing_of(const Entry& entry, const std::map<int, Trials>& trials, do
   return standing;
 }
 
-// Best first in each engine and actuation: by the rung that is reached, then by how many are passed at all, then by the
-// mean.
+// Best first: by the rung that is reached, then by how many are passed at all, then by the mean.
+auto merit_of(const Standing& standing) {
+  return std::tuple(-standing.reached.value_or(-1), -standing.passed, -standing.mean);
+}
+
+// Best first in each engine and actuation.
 auto place_of(const Standing& standing) {
-  return std::tuple(standing.entry.engine, standing.entry.actuation, -standing.reached.value_or(-1), -standing.passed,
-                    -standing.mean, standing.entry.controller);
+  return std::tuple(standing.entry.engine, standing.entry.actuation, merit_of(standing), standing.entry.controller);
 }
 
 void add_standing(const Standing& standing, const std::map<int, std::string>& names, Estimates& into) {
@@ -174,6 +180,93 @@ Pivot arena_pivot(const std::map<int, std::string>& names, double level) {
   return pivot;
 }
 
+// A network that a public benchmark ran, too, the same file by its digest. survival: until it fell, of 90 s, the mean
+// of its two engines. [s]
+struct PublicStanding {
+  std::string_view controller, theirs;
+  double survival;
+};
+// Source: github.com/rhoyn/teleop-walking-benchmark, README at 0b2ea7a (MuJoCo and PhysX, 512 runs each but homie's
+// 5120; its rl_mjlab is the file 2a66ca63, which g1_deploy ships, too).
+constexpr std::array<PublicStanding, 6> kPublicStandings = {{{"homie", "homie", 78.6},
+                                                             {"falcon_dec_loco", "falcon", 38.95},
+                                                             {"unitree_rl_lab", "rl_lab", 24.35},
+                                                             {"holosoma_fastsac", "holosoma", 6.15},
+                                                             {"g1_deploy_velocity", "rl_mjlab", 5.45},
+                                                             {"rl_gym", "rl_gym", 1.3}}};
+constexpr const char* kPublicBenchmark = "teleop-walking-benchmark";
+constexpr std::size_t kFewestRanked = 3;  // of fewer an order says nothing
+constexpr int kOrderResamples = 10000;
+
+const PublicStanding* public_standing(std::string_view controller) {
+  const auto found = std::ranges::find(kPublicStandings, controller, &PublicStanding::controller);
+  return found == kPublicStandings.end() ? nullptr : &*found;
+}
+
+// Kendall's tau-b of the board's order, best first, with the benchmark's over the networks of both; networks are drawn
+// again for its interval. `board`: of one engine and actuation.
+void add_order(std::span<const Standing> board, double level, Estimates& into) {
+  std::vector<double> ours, theirs;
+  std::vector<int> numbers;
+  for (const Standing& standing : board) {
+    const PublicStanding* found = public_standing(standing.entry.controller);
+    if (found == nullptr) continue;
+    const auto better = [&](const Standing& other) { return merit_of(other) < merit_of(standing); };
+    ours.push_back(-static_cast<double>(std::ranges::count_if(board, better)));
+    theirs.push_back(found->survival);
+    numbers.push_back(static_cast<int>(numbers.size()));
+  }
+  if (ours.size() < kFewestRanked) return;
+  const auto drawn_again = [&](std::span<const double> times) {
+    std::vector<double> a, b;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      a.insert(a.end(), static_cast<std::size_t>(times[i]), ours[i]);
+      b.insert(b.end(), static_cast<std::size_t>(times[i]), theirs[i]);
+    }
+    return kendall(a, b).tau_b;
+  };
+  const RankAgreement agreement = kendall(ours, theirs);
+  const Entry& entry = board.front().entry;
+  const EstimatesOf of{{.engine = entry.engine, .perturbation = entry.actuation, .of = "public_order"}, into};
+  of.add("tau_b", static_cast<long>(ours.size()), agreement.tau_b,
+         ClusterBootstrap(kOrderResamples, 1).weighted(numbers, drawn_again, level));
+  of.count("swapped", agreement.pairs, agreement.discordant);
+}
+
+Pivot order_pivot(double level) {
+  std::vector<std::string> theirs;
+  for (const PublicStanding& each : kPublicStandings)
+    theirs.push_back(fmt::format("{} ({:.1f} s)", each.controller, each.survival));
+  Pivot pivot{.title = fmt::format("Arena: the order beside {}", kPublicBenchmark),
+              .rows = {{"Engine", &Estimate::engine, true}, {"Actuation", &Estimate::perturbation, true}},
+              .columns = {column("Networks", {.of = "public_order", .name = "tau_b"}, as_n),
+                          column("tau-b", {.of = "public_order", .name = "tau_b"}, as_decimals(2)),
+                          column("Swapped pairs", {.of = "public_order", .name = "swapped"}, as_count_of_n)}};
+  pivot.notes = {fmt::format(
+      "Kendall's tau-b of this board's order with that of {}, over the networks (by digest) of both: 1 the same order, "
+      "-1 the reverse. Its order is by the time until a fall under growing punches, the arms moved by the harness: {}. "
+      "Interval: {:g} %, networks drawn again.",
+      kPublicBenchmark, fmt::join(theirs, ", "), 100.0 * level)};
+  return pivot;
+}
+
+// The boards of engines and actuations, one after another.
+void add_orders(const std::vector<Standing>& standings, double level, Estimates& into) {
+  for (auto begin = standings.begin(); begin != standings.end();) {
+    const auto of_another = [&](const Standing& standing) {
+      return std::tie(standing.entry.engine, standing.entry.actuation) !=
+             std::tie(begin->entry.engine, begin->entry.actuation);
+    };
+    const auto end = std::find_if(begin, standings.end(), of_another);
+    add_order({begin, end}, level, into);
+    begin = end;
+  }
+  if (into.empty()) return;
+  for (const PublicStanding& each : kPublicStandings)
+    EstimatesOf{{.source = kPublicBenchmark, .controller = std::string(each.controller), .of = "public_order"}, into}
+        .add("survival", {}, each.survival, kNoInterval, "s");
+}
+
 }  // namespace
 
 Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level) {
@@ -210,6 +303,11 @@ Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level) {
                                       counted(static_cast<long>(messages.size()), "episode"),
                                       escape_markdown(messages.front())));
   analysis.tables = {table_of(analysis.estimates, pivot)};
+  Estimates orders;
+  add_orders(standings, level, orders);
+  if (orders.empty()) return analysis;
+  analysis.tables.push_back(table_of(orders, order_pivot(level)));
+  analysis.estimates.insert(analysis.estimates.end(), orders.begin(), orders.end());
   return analysis;
 }
 

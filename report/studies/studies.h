@@ -55,7 +55,8 @@ Analysis level_analysis(const std::vector<EpisodeRow>& rows, double level = 0.95
 // perturbation's counts where both have them); the perturbation's tag `actuation` tells actuations apart. A rung is
 // passed where the lower end of the interval of its episodes is .7 or more; its episodes are draws of the suite's
 // noise, poses and pushes. An episode passes as in level_analysis and, where its clip has the tag `arms: followed`,
-// with the upper body within .12 rad of its reference on average.
+// with the upper body within .12 rad of its reference on average. Beside it, where three networks or more are in a
+// public benchmark, too: Kendall's tau-b of the two orders.
 Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level = 0.95);
 
 // Recorded and synthetic people side by side, as rows' tags say: what each policy achieves with the one and with the

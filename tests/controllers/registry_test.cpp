@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <set>
+#include <vector>
 
 #include "duet/core/require.h"
 #include "tests/backends/g1_scene.h"
@@ -127,6 +129,40 @@ TEST(ExplicitStepOption, LowersTheDampingThatWouldShake) {
                 static_cast<void>(load_controller("pd", robot, {{"explicit_step", "soon"}}));
               }),
               HasSubstr("controller 'pd': "));
+}
+
+TEST(ArmsOption, TakesTheArmsFromTheControllerAndNothingElse) {
+  const auto robot = test::body("g1");
+  const RobotState state = robot->standing_state();
+  Reference reference{state.X_WB, state.q};
+  for (const std::vector<int>& arm : robot->roles.arms)
+    for (const int joint : arm) reference.q[joint] += 0.1;
+  const auto answer = [&](const ControllerOptions& options) {
+    const std::unique_ptr<Controller> controller = make_controller("wbc_sim", robot, options);
+    JointCommand command = robot->default_command(state.q);
+    controller->reset(state);
+    controller->act(state, reference, command);
+    return command;
+  };
+  const JointCommand own = answer({}), taken = answer({{"arms", "reference"}});
+  EXPECT_EQ(answer({{"arms", "own"}}).q_target, own.q_target);
+  EXPECT_EQ(taken.kp, own.kp);
+  std::set<int> arms;
+  for (const std::vector<int>& arm : robot->roles.arms) arms.insert(arm.begin(), arm.end());
+  EXPECT_EQ(arms.size(), 14U);
+  for (int j = 0; j < robot->dof(); ++j) {
+    EXPECT_EQ(taken.q_target[j], arms.contains(j) ? reference.q[j] : own.q_target[j]) << robot->joints[j].name;
+    if (arms.contains(j)) {
+      EXPECT_NE(own.q_target[j], reference.q[j]) << robot->joints[j].name;
+    }
+  }
+}
+
+TEST(ArmsOption, RefusesARobotWithoutArmsThatMove) {
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
+                static_cast<void>(make_controller("pd", test::body("g1_12dof"), {{"arms", "reference"}}));
+              }),
+              HasSubstr("controller 'pd': option 'arms': expected a robot with arms that move, found 'g1_12dof'"));
 }
 
 }  // namespace

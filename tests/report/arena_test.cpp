@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "duet/report/studies/studies.h"
 #include "tests/report/estimates.h"
 #include "tests/report/policy_rows.h"
@@ -122,6 +124,45 @@ TEST(Arena, NamesWhatCouldNotRunAndIsNoTableWithoutRungs) {
   add_episodes({.successes = "11"}, plain);
   EXPECT_TRUE(arena_analysis(plain).empty());
   EXPECT_TRUE(arena_analysis({}).tables.empty());
+}
+
+// Episodes of the networks that a public benchmark ran, each passing the first so many of three rungs.
+std::vector<EpisodeRow> ranked(const std::vector<std::pair<std::string, int>>& rungs_passed) {
+  std::vector<EpisodeRow> rows;
+  for (const auto& [controller, passed] : rungs_passed)
+    for (int rung = 1; rung <= 3; ++rung)
+      add({.controller = controller,
+           .successes = rung <= passed ? kAll : "0000",
+           .rung = rung,
+           .name = fmt::format("r{}", rung)},
+          rows);
+  return rows;
+}
+
+TEST(Arena, HoldsItsOrderAgainstThatOfAPublicBenchmark) {
+  const auto tau_b = [](const Analysis& analysis) {
+    return estimate(analysis, {.of = "public_order", .name = "tau_b"});
+  };
+  const Analysis same = arena_analysis(ranked({{"homie", 3}, {"rl_gym", 0}, {"unitree_rl_lab", 1}, {"vmc", 2}}));
+  EXPECT_EQ(tau_b(same).value, 1.0);
+  EXPECT_EQ(tau_b(same).n, 3);  // nobody else ran vmc
+  EXPECT_EQ(estimate(same, {.of = "public_order", .name = "swapped"}).value, 0.0);
+  ASSERT_EQ(same.tables.size(), 2U);
+  EXPECT_THAT(same.tables[1].table.rows.at(0), ElementsAre("mujoco", "implicit", "3", HasSubstr("1.00"), "0/3"));
+  const Analysis reversed = arena_analysis(ranked({{"homie", 0}, {"rl_gym", 3}, {"unitree_rl_lab", 1}}));
+  EXPECT_EQ(tau_b(reversed).value, -1.0);
+  EXPECT_EQ(tau_b(reversed).interval.low, -1.0);
+  const Analysis tied =
+      arena_analysis(ranked({{"homie", 1}, {"rl_gym", 2}, {"falcon_dec_loco", 3}, {"unitree_rl_lab", 1}}));
+  EXPECT_NEAR(tau_b(tied).value, -1.0 / std::sqrt(5.0 * 6.0), 1e-12);  // 2 pairs agree, 3 do not, 1 is tied
+  EXPECT_LT(tau_b(tied).interval.low, tau_b(tied).value);
+  EXPECT_GT(tau_b(tied).interval.high, tau_b(tied).value);
+}
+
+TEST(Arena, AnOrderOfTwoNetworksSaysNothing) {
+  const Analysis two = arena_analysis(ranked({{"homie", 3}, {"rl_gym", 0}, {"vmc", 2}, {"falcon", 1}}));
+  EXPECT_EQ(two.tables.size(), 1U);
+  EXPECT_TRUE(estimates_like(two, {.of = "public_order", .name = "tau_b"}).empty());
 }
 
 }  // namespace
