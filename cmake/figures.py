@@ -321,7 +321,7 @@ def body_of(controller):
 
 def arena(folder, engine, actuation):
     """The board of an engine and actuation, best first: the rung that each controller reaches, where it fails first, and how many episodes pass at each."""
-    rows = [r for r in rows_of(folder, "arena.csv") if (r["engine"], r["perturbation"]) == (engine, actuation)]
+    rows = [r for r in rows_of(folder, "arena.csv") if (r["engine"], r["perturbation"]) == (engine, actuation) and r["controller"]]
     if not rows:
         raise Refused(f"{folder}/arena.csv has no row of {engine}, {actuation}")
     rungs, table = sorted({r["of"] for r in rows if r["name"] == "passes"}), []
@@ -351,8 +351,8 @@ def arena_order(*boards):
         cells = []
         for here in columns:
             of = {r["name"]: r for r in here if r["controller"] == network and r["of"] == "rung"}
-            cells.append(f"{of['reached']['text'] or of['reached']['value'] if 'reached' in of else 'none'}, {percent(of['mean']['value'])}" if of else "-")
-        table.append([f"`{network}`", f"{seconds:.1f}", *cells])
+            cells.append(f"{of['reached']['value'] if 'reached' in of else 'none'}, {percent(of['mean']['value'])}" if of else "-")
+        table.append([f"`{network}`", f"{seconds:g}", *cells])
     def agreement(here):
         tau, swapped = (figure(here, "arena.csv", of="public_order", name=name) for name in ("tau_b", "swapped"))
         return f"{float(tau['value']):.2f} [{float(tau['low']):.2f}, {float(tau['high']):.2f}]; {swapped['value']} of {swapped['n']}"
