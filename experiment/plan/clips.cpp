@@ -138,18 +138,16 @@ void like_people(const SyntheticClip& source, SynthesisOptions& options) {
   options.outcome = random.chance(kHesitant) ? ActOutcome::kHesitant : ActOutcome::kComplete;
 }
 
-// Draws the wait, so that a policy does not learn to count it; half of the clips are padded as recordings
+// Draws the wait without memory, so that a policy cannot count it; half of the clips are padded as recordings
 // are: both people frozen in the first frame of the act. Nobody begins by himself before a partner who stands still
 // but has looked at him for longer than D-STAR's memory of 4.4 s.
 ClipPadding vary_standing(const SyntheticClip& source, SynthesisOptions& options) {
-  constexpr double kShortest = 2.5, kLongest = 5.5;       // before the act [s]
-  constexpr double kLooksFor = 5.0, kMeanPatience = 1.0;  // and before a partner who stands still [s]
+  constexpr double kLooksFor = 5.0, kMeanPatience = 1.0;  // before a partner who stands still [s]
   Random random(source.seed, stream_key({"stands", to_string(source.task), std::to_string(source.index)}));
-  const bool memoryless = source.like == Likeness::kVaried;
   const auto drawn = [&](double mean) { return -mean * std::log1p(-random.uniform()); };
-  double before = memoryless ? drawn(kStandingBefore) : random.uniform(kShortest, kLongest);
+  double before = drawn(kStandingBefore);
   const double still = definition_of(source.task).act.varied.still;
-  if (memoryless && still > 0.0) options.still = random.chance(still);
+  if (source.like == Likeness::kVaried && still > 0.0) options.still = random.chance(still);
   if (options.still.value_or(false)) before = kLooksFor + drawn(kMeanPatience);
   if (random.chance(0.5)) {
     options.before = before;

@@ -21,7 +21,7 @@ namespace {
 DemonstrationOptions small_options() {
   DemonstrationOptions options;
   options.clips = {{Likeness::kScripted, 3}};
-  options.pair_mode = "paper";
+  options.retargeting = "paper";
   options.starts = 2;
   options.followed = 1;
   options.engine = "playback";  // the robot is where it is told to be: nobody falls
@@ -94,10 +94,19 @@ TEST(MakeDemonstrations, TheirOriginSaysHowTheyWereMade) {
   EXPECT_EQ(origin_of(options),
             "3 clips of each task (seed 880001), retargeted by paper, 1 start of each, none followed");
   options.clips.push_back({Likeness::kPeople, 40});
-  options.pair_mode = "best";
+  options.retargeting = "best";
   EXPECT_EQ(
       origin_of(options),
       "3 clips of each task and 40 like people (seed 880001), retargeted by best, 1 start of each, none followed");
+}
+
+TEST(MakeDemonstrations, AreRetargetedByAModeAndOptionsAfterIt) {
+  EXPECT_EQ(parse_retargeting("best").weights.kin, make_pair_options({{"mode", "best"}}).weights.kin);
+  const PairOptions nearer = parse_retargeting("w-kin=8 best");
+  EXPECT_EQ(nearer.mode, PairMode::kBest);
+  EXPECT_EQ(nearer.weights.kin, 8.0);
+  EXPECT_THROW(parse_retargeting("best w-kin=much"), std::invalid_argument);
+  EXPECT_THROW(parse_retargeting("better"), std::invalid_argument);
 }
 
 TEST(MakeDemonstrations, ForTheRealRobotAreThoseOfAlgorithm7) {

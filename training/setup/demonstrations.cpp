@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <sstream>
+#include <utility>
 
 #include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
@@ -257,6 +259,19 @@ AdaptedMotion begun_at_once(const AdaptedMotion& waits) {
   return made;
 }
 
+PairOptions parse_retargeting(const std::string& text) {
+  std::vector<std::pair<std::string, std::string>> choices;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const auto equals = word.find('=');
+    if (equals == std::string::npos)
+      choices.emplace_back("mode", word);
+    else
+      choices.emplace_back(word.substr(0, equals), word.substr(equals + 1));
+  }
+  return make_pair_options(choices);
+}
+
 std::string origin_of(const DemonstrationOptions& options) {
   std::string clips;
   for (const auto& [like, per_task] : options.clips)
@@ -264,7 +279,7 @@ std::string origin_of(const DemonstrationOptions& options) {
                          like == Likeness::kPeople   ? " like people"
                          : like == Likeness::kVaried ? " that vary more"
                                                      : "");
-  clips += fmt::format(" (seed {}), retargeted by {}, {} start{} of each{}", options.seed, options.pair_mode,
+  clips += fmt::format(" (seed {}), retargeted by {}, {} start{} of each{}", options.seed, options.retargeting,
                        options.starts, options.starts == 1 ? "" : "s",
                        options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)"
                        : options.leads                        ? " in answer to the partner or to begin"
@@ -283,7 +298,7 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
   const bool simulated = !options.engine.empty() && options.engine != kPlaybackEngine;
   const LoadedController controller =
       simulated ? load_controller(options.controller, robot, controller_options(options)) : LoadedController();
-  const PairOptions pair = make_pair_options({{"mode", options.pair_mode}});
+  const PairOptions pair = parse_retargeting(options.retargeting);
   DemonstrationSet set;
   set.robot_digest = robot->digest;
   set.origin = origin_of(options);

@@ -14,6 +14,7 @@
 #include "duet/motion/paired_motion.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/policies/policy.h"
+#include "duet/retarget/options.h"
 #include "duet/robots/robot_model.h"
 #include "duet/training/dstar/demonstrations.h"
 
@@ -27,7 +28,7 @@ struct DemonstrationClips {
 struct DemonstrationOptions {
   std::vector<DemonstrationClips> clips = {{Likeness::kScripted, 80}, {Likeness::kPeople, 400}};
   std::uint64_t seed = 880001;
-  std::string pair_mode = "best";          // of PAIR (docs/retargeting.md)
+  std::string retargeting = "best";        // parse_retargeting
   int starts = 2;                          // of each clip, drawn as A.4.4 has it
   StartMode start = StartMode::kApproach;  // or kSimToReal: Algorithm 7, whose starts are all the same
   bool answers = false;                    // it comes early and waits, and begins after its partner (kApproach)
@@ -43,6 +44,10 @@ struct DemonstrationOptions {
 };
 
 inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 890001;
+
+// "best w-kin=8": a mode of PAIR and options after it (docs/retargeting.md). Throws std::invalid_argument as
+// make_pair_options does.
+PairOptions parse_retargeting(const std::string& text);
 
 // "80 clips of each task and 400 like people (seed 880001), retargeted by best, 2 starts of each, up to 200 of a kind
 // followed in mujoco under wbc_sim by replay".

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
@@ -67,6 +68,16 @@ std::string read_clips(PolicyTraining& training, const std::string& text) {
   return "";
 }
 
+std::string read_retargeting(PolicyTraining& training, const std::string& text) {
+  try {
+    parse_retargeting(text);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  training.data.retargeting = text;
+  return "";
+}
+
 FieldTable<PolicyTraining> demonstration_fields() {
   using T = PolicyTraining;
   return {
@@ -75,8 +86,9 @@ FieldTable<PolicyTraining> demonstration_fields() {
           "MANNER:N, of rehearsed, people and varied", [](const T& training) { return text_of(training.data.clips); },
           read_clips),
       field<T>(
-          {.name = "mode", .meaning = "of retargeting: paper, grounded or best"},
-          [](auto& t) -> auto& { return t.data.pair_mode; }),
+          {.name = "mode", .meaning = "of retargeting: paper, grounded or best, and options of PAIR after it"},
+          "a mode and name=value, as in best w-kin=8", [](const T& training) { return training.data.retargeting; },
+          read_retargeting),
       field<T>(
           {.name = "starts", .meaning = "starts of each clip", .range = kCount},
           [](auto& t) -> auto& { return t.data.starts; }),
