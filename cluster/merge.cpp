@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "duet/cluster/attempt.h"
@@ -36,12 +37,19 @@ class Merger {
 
   [[nodiscard]] const ArchivedSuite& kept() const { return kept_; }
 
+  // Episodes of the united suite, where all runs have its engines and each of their arms has as many.
+  [[nodiscard]] std::optional<std::int64_t> episodes() const {
+    if (!of_each_arm_) return std::nullopt;
+    return *of_each_arm_ * arms(kept_.suite);
+  }
+
  private:
   void add(const Run& run) {
     const Suite suite = rebased(parse_run_suite(run.info.suite_yaml, in(run.path, "suite.yaml")), run.path, folder_);
     const std::vector<RunInput> inputs = read_inputs(run.path);
     const bool first = kept_.suite.name.empty();
     if (first) kept_.suite = suite;
+    count(run.info.plan, suite, first);
     for (const RunInput& input : inputs)
       if (first || is_of_new_policy(input)) add(input, run.path);
     for (const SuitePolicy& policy : suite.policies)
@@ -49,6 +57,24 @@ class Merger {
     for (const std::string& engine : suite.engines)
       if (std::ranges::find(kept_.suite.engines, engine) == kept_.suite.engines.end())
         kept_.suite.engines.push_back(engine);
+  }
+
+  static std::int64_t arms(const Suite& suite) {
+    const auto policies =
+        std::ranges::count_if(suite.policies, [](const auto& one) { return one.name != kNullPolicy; });
+    return policies + static_cast<std::int64_t>(suite.controls.size()) + (suite.null_arm ? 1 : 0);
+  }
+
+  void count(const std::optional<RunPlan>& plan, const Suite& suite, bool first) {
+    const std::int64_t own = arms(suite);
+    std::optional<std::int64_t> each;
+    if (plan && own > 0 && plan->episodes % own == 0) each = plan->episodes / own;
+    const bool same = std::set(suite.engines.begin(), suite.engines.end()) ==
+                      std::set(kept_.suite.engines.begin(), kept_.suite.engines.end());
+    if (first)
+      of_each_arm_ = each;
+    else if (!same || each != of_each_arm_)
+      of_each_arm_.reset();
   }
 
   [[nodiscard]] bool has_policy(const std::string& name) const {
@@ -67,6 +93,7 @@ class Merger {
 
   std::string folder_;
   ArchivedSuite kept_;
+  std::optional<std::int64_t> of_each_arm_;
 };
 
 // The lines that say who resumed which of the runs, each line once.
@@ -198,6 +225,11 @@ void fill(const std::string& folder, const std::string& partial, const MergeInpu
   info.environment = united_environment(inputs.runs_of_nodes());
   const Merger merger(runs, folder);
   info.suite_yaml = resolved_yaml(merger.kept().suite);
+  if (const std::optional<std::int64_t> episodes = merger.episodes(); episodes && info.plan) {
+    if (rows.rows == *episodes) info.plan->asked = rows.rows;  // what one lacks another has
+    info.plan->episodes = std::max(*episodes, info.plan->asked);
+    if (info.plan->asked == info.plan->episodes) info.plan->parts = {EpisodeFilter()};
+  }
   info.argv = argv;
   static_cast<void>(RunDirectory::open(partial, info));
   keep_inputs(merger.kept(), partial);

@@ -37,7 +37,7 @@ POLICIES = {
     "replay+servo": "replay (knows the motion), with the servo",
     "null": "null (stands still)",
 }
-CONTROLS = {"canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)"}
+CONTROLS = {"waiting": "waiting (scripted, told the task, begins when its partner does)", "canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)"}
 CONDITIONS = ("act", "alone", "touch", "force", "reply", "stands")
 
 

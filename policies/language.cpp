@@ -211,6 +211,7 @@ class LanguageTable final : public LanguageEncoder {
 std::string_view task_prompt(Task task) { return definition_of(task).prompt; }
 std::span<const std::string_view> task_paraphrases(Task task) { return definition_of(task).paraphrases; }
 std::string leading_prompt(std::string_view prompt) { return fmt::format("{} first", prompt); }
+bool is_leading(std::string_view prompt) { return prompt.ends_with(" first"); }
 
 std::unique_ptr<LanguageEncoder> built_in_language() { return std::make_unique<BuiltInLanguage>(); }
 

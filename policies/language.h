@@ -39,6 +39,7 @@ std::string_view task_prompt(Task task);
 std::span<const std::string_view> task_paraphrases(Task task);
 // The command to begin, for a partner who will not: "wave to the person first".
 std::string leading_prompt(std::string_view prompt);
+bool is_leading(std::string_view prompt);
 
 double cosine(const std::vector<float>& a, const std::vector<float>& b);
 

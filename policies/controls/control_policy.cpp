@@ -3,16 +3,18 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
 #include "duet/core/require.h"
+#include "duet/policies/language.h"
 #include "duet/robots/roles.h"
 
 namespace duet {
 namespace {
 
-using ControlArray = std::array<ControlScript, 8>;
+using ControlArray = std::array<ControlScript, 9>;
 constexpr ControlArray kControls = {
     {{.name = "omni",
       .about = "Blind to the command: a hand at the partner's nearest hand, and all gestures in rounds",
@@ -39,7 +41,11 @@ constexpr ControlArray kControls = {
      {.name = "mirror",
       .about = "Blind to the command: walks up, its arms and trunk do as the partner's",
       .distance = 0.70,
-      .mirrors = true}}};
+      .mirrors = true},
+     {.name = "waiting",
+      .about = "Told the task: its fixed gesture once the partner begins, at once where told to be first",
+      .waits = true,
+      .told = true}}};
 
 const ControlScript& control_named(std::string_view name) {
   const auto found = std::ranges::find(kControls, name, &ControlScript::name);
@@ -57,13 +63,28 @@ ControlScript told_script(Task task) {
   return control_named("servo");
 }
 
+// The script of `waiting`: that of `canned`, from the partner's beginning on. Distances and arms of an embrace were
+// tried on a development seed (24500).
+ControlScript waiting_script(Task task) {
+  ControlScript script = told_script(task);
+  if (to_string(task) == "hug") script = {.distance = 0.40, .apart = 0.90, .embraces = true};
+  if (to_string(task) == "handshake") {
+    script.distance = 0.65;
+    script.apart = 0.85;
+  }
+  script.waits = script.once = true;
+  return script;
+}
+
 // One round of `omni`: it bows, from here on it kisses, waves, waves from nearer, begins anew. [s]
 struct Round {
   double kiss, wave, near, end;
 };
 constexpr Round kRound = {1.6, 3.2, 5.0, 7.0};
 
-constexpr double kRaisedHand = 0.12;               // a hand of the partner that rises so far is raised [m]
+constexpr double kRaisedHand = 0.12;  // a hand of the partner that rises so far is raised [m]
+constexpr double kLeaning = 0.14;     // a trunk of the partner that leans so far more than before bows [rad]
+constexpr double kClosing = 0.2;      // of an embrace, a plan [1]
 constexpr double kAdvance = 0.45, kRetreat = 0.4;  // [m/s]
 constexpr double kTurn = 0.7;                      // [rad/s]
 constexpr double kWaist = 0.5, kPitch = 0.35;      // of a bow [rad]
@@ -105,6 +126,12 @@ ControlPolicy::ControlPolicy(std::shared_ptr<const RobotModel> robot, const Cont
   for (const int side : {0, 1})
     poses_.forward[side] =
         arms_.reached(side, arms_.shoulder(side) + arm * Eigen::Vector3d(0.85, side == 0 ? -0.05 : 0.05, -0.12));
+  for (const int side : {0, 1}) {
+    const double out = side == 0 ? arm : -arm;
+    poses_.open[side] = arms_.reached(side, arms_.shoulder(side) + Eigen::Vector3d(0.6 * arm, 0.35 * out, 0.1 * arm));
+    poses_.closed[side] =
+        arms_.reached(side, arms_.shoulder(side) + Eigen::Vector3d(0.6 * arm, -0.2 * out, 0.15 * arm));
+  }
   poses_.raised = arms_.reached(1, right + arm * Eigen::Vector3d(0.55, -0.15, 0.55));
   poses_.wave_out = arms_.reached(1, right + arm * Eigen::Vector3d(0.40, -0.50, 0.50));
   poses_.wave_in = arms_.reached(1, right + arm * Eigen::Vector3d(0.45, 0.10, 0.50));
@@ -115,10 +142,15 @@ ControlPolicy::ControlPolicy(std::shared_ptr<const RobotModel> robot, const Cont
 
 void ControlPolicy::reset(const EpisodeContext& context) {
   start_ = robot_->standing_state(context.start.X_WB);
-  now_ = script_.told ? told_script(context.task) : script_;
+  now_ = !script_.told ? script_ : script_.waits ? waiting_script(context.task) : told_script(context.task);
   followed_ = robot_->neutral;
   partner_.reset();
-  awake_ = !now_.waits;
+  const bool first = now_.gesture != ControlGesture::kNone && is_leading(context.prompt);
+  awake_ = !now_.waits || first;
+  now_.once = now_.once && !first;
+  least_lean_ = std::numeric_limits<double>::infinity();
+  begun_ = closing_ = 0.0;
+  served_ = 1.0;
   leaning_ = 0.0;
 }
 
@@ -133,7 +165,9 @@ Anchors ControlPolicy::act(const Observation& observation) {
 std::vector<Reference> ControlPolicy::plan(const Observation& observation) {
   const ObservationFrame& frame = observation.now();
   const Place where = place(frame);
-  if (!awake_) watch(frame);
+  partner_.look(frame);
+  if (!awake_) watch(frame, observation.tick);
+  if (now_.embraces && awake_ && where.distance < now_.distance + 0.1) closing_ = std::min(1.0, closing_ + kClosing);
   if (now_.follows >= 0) follow(frame);
   if (now_.mirrors) mirror(frame, where);
   std::vector<Reference> references;
@@ -160,6 +194,7 @@ void ControlPolicy::follow(const ObservationFrame& frame) {
   const int side = now_.follows;
   arms_.stretch(side, X_WY.inverse() * Eigen::Vector3d(frame.partner.col(hand)) - arms_.shoulder(side), true,
                 followed_);
+  if (now_.once) served_ = smooth(partner_.rise(hand == kLeftHand ? 0 : 1) / kRaisedHand - 0.5);
 }
 
 // Arms from the shoulders and the trunk from the root, each in the frame of who faces the other; the robot's own size.
@@ -179,9 +214,17 @@ void ControlPolicy::mirror(const ObservationFrame& frame, const Place& place) {
   leaning_ = std::clamp(std::atan2(trunk.x(), trunk.z()) / (kWaist + kPitch), 0.0, 1.0);
 }
 
-void ControlPolicy::watch(const ObservationFrame& frame) {
-  partner_.look(frame);
+void ControlPolicy::watch(const ObservationFrame& frame, int tick) {
   for (const int side : {0, 1}) awake_ = awake_ || partner_.height[side] >= partner_.lowest[side] + kRaisedHand;
+  const Eigen::Vector3d trunk = frame.partner.col(kHead) - frame.partner.col(0);
+  const double lean = std::atan2(trunk.head<2>().norm(), trunk.z());
+  least_lean_ = std::min(least_lean_, lean);
+  if (now_.gesture == ControlGesture::kBow && lean >= least_lean_ + kLeaning) awake_ = true;
+  if (awake_) begun_ = tick / 50.0;
+}
+
+double ControlPolicy::gesture_time(double seconds) const {
+  return now_.once ? seconds - begun_ : std::fmod(seconds - begun_, 4.0);
 }
 
 double ControlPolicy::bow(double seconds) const {
@@ -190,8 +233,8 @@ double ControlPolicy::bow(double seconds) const {
     const double t = std::fmod(seconds, kRound.end);
     return smooth(t / 0.6) * smooth((kRound.kiss - t) / 0.6);
   }
-  if (now_.gesture != ControlGesture::kBow) return 0.0;
-  const double t = std::fmod(seconds, 4.0);
+  if (now_.gesture != ControlGesture::kBow || !awake_) return 0.0;
+  const double t = gesture_time(seconds);
   return smooth(t / 0.8) * smooth((3.0 - t) / 0.8);
 }
 
@@ -200,15 +243,20 @@ Eigen::VectorXd ControlPolicy::pose(double seconds) const {
   const double round = std::fmod(seconds, kRound.end);
   if (now_.forward)
     for (const int side : {0, 1}) copy_arm(side, poses_.forward[side], 1.0, q);
+  if (now_.embraces && awake_)
+    for (const int side : {0, 1}) {
+      copy_arm(side, poses_.open[side], smooth((seconds - begun_) / 0.8), q);
+      copy_arm(side, poses_.closed[side], smooth(closing_), q);
+    }
   if (now_.raised) copy_arm(1, poses_.raised, 1.0, q);
-  if (now_.follows >= 0 && awake_) copy_arm(now_.follows, followed_, 1.0, q);
+  if (now_.follows >= 0 && awake_) copy_arm(now_.follows, followed_, served_, q);
   if (now_.mirrors)
     for (const int side : {0, 1}) copy_arm(side, followed_, 1.0, q);
   const bool in_kiss = now_.all_gestures && round >= kRound.kiss && round < kRound.wave;
-  const bool kisses = now_.gesture == ControlGesture::kKiss || in_kiss;
-  const bool waves = now_.gesture == ControlGesture::kWave || (now_.all_gestures && round >= kRound.wave);
+  const bool kisses = (now_.gesture == ControlGesture::kKiss && awake_) || in_kiss;
+  const bool waves = (now_.gesture == ControlGesture::kWave && awake_) || (now_.all_gestures && round >= kRound.wave);
   if (kisses) {
-    const double t = now_.all_gestures ? round - kRound.kiss : std::fmod(seconds, 4.0);
+    const double t = now_.all_gestures ? round - kRound.kiss : gesture_time(seconds);
     const double up = smooth(t / 0.5) * (now_.all_gestures ? 1.0 : 1.0 - smooth((t - 2.4) / 0.6));
     Eigen::VectorXd hand = robot_->neutral;
     copy_arm(1, poses_.mouth, 1.0, hand);
@@ -216,7 +264,7 @@ Eigen::VectorXd ControlPolicy::pose(double seconds) const {
     copy_arm(1, hand, up, q);
   }
   if (waves) {
-    const double swing = std::abs(4.0 * std::fmod(kWaveRate * seconds, 1.0) - 2.0) / 2.0;  // 0 to 1 and back
+    const double swing = std::abs(4.0 * std::fmod(kWaveRate * (seconds - begun_), 1.0) - 2.0) / 2.0;  // 0 to 1 and back
     copy_arm(1, poses_.wave_out, 1.0, q);
     copy_arm(1, poses_.wave_in, swing, q);
   }
@@ -233,7 +281,8 @@ Reference ControlPolicy::reference(const Place& place, double seconds, double ah
   double yaw = yaw_of(start_.X_WB.R);
   if (now_.distance > 0.0) {
     const bool near = now_.all_gestures && std::fmod(seconds, kRound.end) >= kRound.near;
-    const double left = place.distance - (now_.distance - (near ? now_.lean_in : 0.0));
+    const double goal = awake_ || now_.apart == 0.0 ? now_.distance : now_.apart;
+    const double left = place.distance - (goal - (near ? now_.lean_in : 0.0));
     const double advance = std::clamp(left, -kRetreat * ahead, kAdvance * ahead);
     yaw = place.yaw + std::clamp(wrapped(place.face - place.yaw), -kTurn * ahead, kTurn * ahead);
     reference.X_WB.p.head<2>() = place.root.head<2>() + advance * place.towards;

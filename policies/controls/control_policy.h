@@ -1,5 +1,5 @@
 // Controls: scripted policies that no score may reward. Each does something simple (stand with a raised hand, walk up,
-// follow the nearest hand, go through every gesture, copy the partner), and all but one are blind to the command. A
+// follow the nearest hand, go through every gesture, copy the partner), and all but two are blind to the command. A
 // score that one of them wins measures less than its name says. Thread-safe.
 #pragma once
 
@@ -27,12 +27,15 @@ struct ControlScript {
   ControlGesture gesture = ControlGesture::kNone;  // again and again, with the right hand
   bool all_gestures = false;                       // one after the other, in rounds
   double lean_in = 0.0;                            // [m] nearer at the end of each such round
-  bool waits = false;                              // its hand follows once the partner has raised one
+  bool waits = false;                              // begins once the partner has raised a hand or leans, unless told to
+  double apart = 0.0;                              // where it waits, as `distance` [m]; 0: at `distance`
+  bool once = false;                               // a gesture is done once, a hand is served while it is raised
+  bool embraces = false;                           // both arms are opened, and close where it has come near
   bool mirrors = false;                            // both arms and the trunk do as the partner's
   bool told = false;                               // does what its task's row in the source says
 };
 
-// `omni`, `canned`, `servo`, `raised`, `walker`, `forward`, `patient`, `mirror`.
+// `omni`, `canned`, `servo`, `raised`, `walker`, `forward`, `patient`, `mirror`, `waiting`.
 std::span<const ControlScript> control_scripts();
 
 // Whether a policy of that name is one of them.
@@ -62,17 +65,19 @@ class ControlPolicy final : public Policy {
   // Joint angles that an arm reaches, over all joints.
   struct Poses {
     std::array<Eigen::VectorXd, 2> forward;
+    std::array<Eigen::VectorXd, 2> open, closed;
     Eigen::VectorXd raised, wave_out, wave_in, mouth, blown;
   };
 
   [[nodiscard]] static Place place(const ObservationFrame& frame);
   [[nodiscard]] Eigen::VectorXd pose(double seconds) const;
-  [[nodiscard]] double bow(double seconds) const;  // 0 upright to 1
+  [[nodiscard]] double gesture_time(double seconds) const;  // since its begin [s]
+  [[nodiscard]] double bow(double seconds) const;           // 0 upright to 1
   [[nodiscard]] Reference reference(const Place& place, double seconds, double ahead) const;
   void follow(const ObservationFrame& frame);
   void mirror(const ObservationFrame& frame, const Place& place);
-  // Looks whether the partner has raised a hand; one that does not wait is awake from the begin.
-  void watch(const ObservationFrame& frame);
+  // Looks whether the partner has begun; one that does not wait is awake from the begin.
+  void watch(const ObservationFrame& frame, int tick);
   void copy_arm(int side, const Eigen::VectorXd& from, double share, Eigen::VectorXd& q) const;
 
   std::shared_ptr<const RobotModel> robot_;
@@ -82,7 +87,11 @@ class ControlPolicy final : public Policy {
   Poses poses_;
   Eigen::VectorXd followed_;  // joints of the arms that follow or mirror
   HandWatch partner_;
+  double least_lean_ = 0.0;  // of the partner's trunk so far [rad]
   bool awake_ = false;
+  double begun_ = 0.0;    // when it awoke [s]
+  double closing_ = 0.0;  // of an embrace, 0 open to 1
+  double served_ = 1.0;   // share of the way that a hand which follows goes
   double leaning_ = 0.0;  // of a mirrored trunk, as bow()
   RobotState start_;
 };

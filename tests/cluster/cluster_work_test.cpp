@@ -197,6 +197,23 @@ TEST_F(ClusterWork, MergedTwiceIsTheSameFile) {
   EXPECT_EQ(test::objection(folder_ / "other"), "");
 }
 
+// Rows of one suite before and after it got another arm: the plan is that of the suite with both.
+TEST_F(ClusterWork, ArmsThatRanApartAreMergedToTheWholeSuite) {
+  Suite before = test::playback_suite(), after = before;
+  after.policies.push_back({"patient"});
+  test::make_run(before, folder_ / "before");
+  RunOptions arm;
+  arm.policies = {"patient"};
+  run_suite(after, folder_ / "arm", arm, quiet_);
+  test::make_run(after, folder_ / "whole");
+  merge_runs({folder_ / "before", folder_ / "arm"}, {.output = folder_ / "merged"});
+  const duet::Run merged = load_run(folder_ / "merged"), whole = load_run(folder_ / "whole");
+  EXPECT_EQ(merged.rows.size(), whole.rows.size());
+  EXPECT_EQ(merged.info.plan, whole.info.plan);
+  merge_runs({folder_ / "arm"}, {.output = folder_ / "alone"});
+  EXPECT_EQ(load_run(folder_ / "alone").info.plan, load_run(folder_ / "arm").info.plan);
+}
+
 TEST_F(ClusterWork, ARowThatDiffersIsToldWithBothNodesAndOneCanBeLeftOut) {
   plan();
   setenv("SLURMD_NODENAME", "n1", 1);

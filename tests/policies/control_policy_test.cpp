@@ -6,8 +6,11 @@
 #include <cmath>
 #include <memory>
 #include <set>
+#include <string>
+#include <utility>
 
 #include "duet/core/task.h"
+#include "duet/policies/language.h"
 #include "duet/robots/roles.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"
@@ -27,11 +30,15 @@ ObservationFrame facing(const RobotModel& robot, double ahead, const Eigen::Vect
   return frame;
 }
 
+// The plan once the partner has raised its hands so far.
 std::vector<Reference> planned(std::string_view name, Task task, const ObservationFrame& frame, int tick = 0) {
   const auto robot = g1();
   const std::unique_ptr<Policy> policy = control_maker(name, robot)();
   EpisodeContext context{.task = task, .prompt = "", .start = frame.robot};
   policy->reset(context);
+  ObservationFrame before = frame;
+  for (const int hand : {kLeftHand, kRightHand}) before.partner(2, hand) -= 0.3;
+  (void)policy->plan({.history = std::span(&before, 1), .tick = 0});
   return policy->plan({.history = std::span(&frame, 1), .tick = tick});
 }
 
@@ -63,7 +70,7 @@ TEST(ControlPolicy, PlansWhatARobotCanDo) {
   }
 }
 
-TEST(ControlPolicy, AllButOneAreBlindToTheCommand) {
+TEST(ControlPolicy, AllButThoseThatAreToldAreBlindToTheCommand) {
   const auto robot = g1();
   const ObservationFrame frame = facing(*robot, 1.2, {0.8, 0.1, 1.0});
   for (const ControlScript& script : control_scripts()) {
@@ -125,6 +132,102 @@ TEST(ControlPolicy, APatientOneWaitsForARaisedHand) {
   EXPECT_GT((hand_in_plan(low) - hanging).norm(), 0.05);
   policy->reset(context);
   EXPECT_LT((hand_in_plan(low) - hanging).norm(), 1e-9) << "the next episode begins anew";
+}
+
+// A policy of that name, which is asked again and again.
+class Control {
+ public:
+  Control(std::string_view name, Task task, std::string prompt, const RobotState& start)
+      : robot_(g1()), policy_(control_maker(name, robot_)()) {
+    policy_->reset({.task = task, .prompt = std::move(prompt), .start = start});
+  }
+  Reference at(const ObservationFrame& frame, int tick) {
+    return policy_->plan({.history = std::span(&frame, 1), .tick = tick}).front();
+  }
+  double hand_height(const ObservationFrame& frame, int tick) { return hand_of(*robot_, at(frame, tick), "rhand").z(); }
+  double lean(const ObservationFrame& frame, int tick) {
+    const Eigen::Vector3d up = at(frame, tick).X_WB.R * Eigen::Vector3d::UnitZ();
+    return std::atan2(up.x(), up.z());
+  }
+
+ private:
+  std::shared_ptr<const RobotModel> robot_;
+  std::unique_ptr<Policy> policy_;
+};
+
+// It stands until the partner raises a hand, whenever that is, and then does its gesture from the beginning, once.
+TEST(ControlPolicy, AWaitingOneBeginsWithItsPartner) {
+  const auto robot = g1();
+  const ObservationFrame low = facing(*robot, 2.0, {1.9, 0.2, 0.8}), high = facing(*robot, 2.0, {1.6, 0.2, 1.2});
+  for (const Task task : {Task::kWave, Task::kFlyKiss}) {
+    Control waiting("waiting", task, "", low.robot);
+    const double hanging = waiting.hand_height(low, 0);
+    for (const int tick : {10, 200, 430}) EXPECT_EQ(waiting.hand_height(low, tick), hanging);
+    (void)waiting.at(high, 440);
+    EXPECT_GT(waiting.hand_height(low, 440 + 40), hanging + 0.2) << "it goes on though the partner has ended";
+  }
+  Control kiss("waiting", Task::kFlyKiss, "", low.robot);
+  const double hanging = kiss.hand_height(low, 0);
+  (void)kiss.hand_height(high, 10);
+  EXPECT_NEAR(kiss.hand_height(low, 10 + 200 + 40), hanging, 1e-9);
+}
+
+TEST(ControlPolicy, AWaitingOneBowsToABow) {
+  const auto robot = g1();
+  ObservationFrame upright = facing(*robot, 2.0, {1.9, 0.2, 0.8});
+  upright.partner.col(kHead) = Eigen::Vector3d(2.0, 0.0, 1.6);
+  ObservationFrame bowed = upright;
+  bowed.partner.col(kHead) = Eigen::Vector3d(1.8, 0.0, 1.55);
+  Control waiting("waiting", Task::kBend, "", upright.robot);
+  for (const int tick : {0, 100, 300}) EXPECT_EQ(waiting.lean(upright, tick), 0.0);
+  (void)waiting.lean(bowed, 310);
+  EXPECT_GT(waiting.lean(bowed, 310 + 60), 0.2);
+  EXPECT_NEAR(waiting.lean(upright, 310 + 260), 0.0, 1e-9) << "once";
+}
+
+// It is told to begin: nobody is waited for.
+TEST(ControlPolicy, AWaitingOneThatIsToBeFirstIsACannedOne) {
+  const auto robot = g1();
+  const ObservationFrame still = facing(*robot, 2.0, {1.9, 0.2, 0.8});
+  for (const Task task : {Task::kWave, Task::kBend, Task::kFlyKiss}) {
+    Control waiting("waiting", task, leading_prompt(task_prompt(task)), still.robot);
+    Control canned("canned", task, "", still.robot);
+    for (const int tick : {0, 30, 60, 130, 270}) {
+      const Reference own = waiting.at(still, tick), other = canned.at(still, tick);
+      EXPECT_EQ(own.q, other.q) << to_string(task) << " " << tick;
+      EXPECT_EQ(own.X_WB.R.coeffs(), other.X_WB.R.coeffs());
+    }
+  }
+}
+
+// It serves a hand for as long as that is raised.
+TEST(ControlPolicy, AWaitingOneLetsGoOfALoweredHand) {
+  const auto robot = g1();
+  const ObservationFrame low = facing(*robot, 0.8, {0.35, -0.1, 0.8}), high = facing(*robot, 0.8, {0.35, -0.1, 1.05});
+  Control waiting("waiting", Task::kHandshake, "", low.robot);
+  const double hanging = waiting.hand_height(low, 0);
+  for (int call = 1; call < 10; ++call) (void)waiting.at(high, 10 * call);
+  EXPECT_GT(waiting.hand_height(high, 100), hanging + 0.1);
+  EXPECT_NEAR(waiting.hand_height(low, 110), hanging, 1e-9);
+}
+
+// Its arms open when the partner raises a hand, and close where it has come near.
+TEST(ControlPolicy, AWaitingOneEmbraces) {
+  const auto robot = g1();
+  const ObservationFrame low = facing(*robot, 0.9, {0.8, 0.2, 0.8}), high = facing(*robot, 0.9, {0.6, 0.2, 1.2});
+  const ObservationFrame near = facing(*robot, 0.42, {0.1, 0.2, 1.2});
+  Control waiting("waiting", Task::kHug, "", low.robot);
+  const auto apart = [&](const ObservationFrame& frame, int tick) {
+    const Reference reference = waiting.at(frame, tick);
+    return (hand_of(*robot, reference, "lhand") - hand_of(*robot, reference, "rhand")).norm();
+  };
+  const Eigen::Vector3d hanging = hand_of(*robot, waiting.at(low, 0), "rhand");
+  (void)apart(high, 10);
+  const double open = apart(high, 60);
+  EXPECT_GT(hand_of(*robot, waiting.at(high, 60), "rhand").z(), hanging.z() + 0.2);
+  double closed = open;
+  for (int call = 0; call < 20; ++call) closed = apart(near, 70 + 10 * call);
+  EXPECT_LT(closed, open - 0.2);
 }
 
 // The partner's hand is before its shoulder, a third of its arm's length up; so is the robot's.

@@ -158,6 +158,8 @@ TEST(Language, TheCommandToBeginIsTheSameTasksAndAnotherCommand) {
   for (const Task task : kPaperTasks) {
     const std::string leads = leading_prompt(task_prompt(task));
     EXPECT_EQ(nearest_task(*encoder, leads), task);
+    EXPECT_TRUE(is_leading(leads));
+    EXPECT_FALSE(is_leading(task_prompt(task)));
     EXPECT_LT(cosine(encoder->embed(leads), encoder->embed(task_prompt(task))), 0.99);
   }
 }
