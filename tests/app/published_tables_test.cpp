@@ -75,9 +75,11 @@ INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables,
                          [](const auto& info) { return std::string(info.param); });
 
 // The others of its tables are long, and nothing is quoted from them.
-TEST(PublishedArena, ItsBoardIsWhatTheRowsSay) {
-  const Analysis board = arena_analysis(load_run(in("published/arena")).rows);
-  EXPECT_EQ(lines_of(read_file(in("tables/arena/arena.csv"))), lines_of(analysis_csv(board)));
+TEST(PublishedArena, ItsBoardsAreWhatTheRowsSay) {
+  for (const std::string run : {"arena", "arena_arms"}) {
+    const Analysis board = arena_analysis(load_run(in("published/" + run)).rows);
+    EXPECT_EQ(lines_of(read_file(in("tables/" + run + "/arena.csv"))), lines_of(analysis_csv(board))) << run;
+  }
 }
 
 }  // namespace
