@@ -21,6 +21,12 @@ constexpr long kTicksToNewWriter = 50;
 constexpr double kPersonJump = 10.0;
 // A joint's measured angle may be beyond its limit by this: play and zero error [rad].
 constexpr double kLimitSlack = 0.02;
+// Speeds that hold: of an arm's joint, and shares of the card's limit. A step of HOMIE's takes ankle and knee to 13
+// rad/s, one of WBC-Sim's an ankle to 15.
+constexpr double kArmSpeed = 10.0;    // [rad/s]
+constexpr double kAnkleShare = 0.5;   // 18.5 rad/s of the G1's
+constexpr double kJointShare = 0.75;  // 15 rad/s of its knees, 24 of its hips
+constexpr int kFirstAnkle = 4;        // the first of the two in a leg
 
 ContactWatch contact_watch(const LimiterSetup& setup) {
   const double force = setup.person ? least_touch_force(setup.touches, setup.contact_limits) : 0.0;
@@ -35,6 +41,16 @@ const GuardSetup& checked(const GuardSetup& setup) {
     require(values->size() == kG1Motors && values->allFinite(),
             "guard: expected a stance of {} finite targets and gains, found another", kG1Motors);
   return setup;
+}
+
+Eigen::VectorXd speed_limits(const RobotModel& robot) {
+  Eigen::VectorXd limits(robot.dof());
+  for (int j = 0; j < robot.dof(); ++j) limits[j] = kJointShare * robot.joints[j].velocity;
+  for (const std::vector<int>& leg : robot.roles.legs)
+    for (std::size_t k = kFirstAnkle; k < leg.size(); ++k) limits[leg[k]] = kAnkleShare * robot.joints[leg[k]].velocity;
+  for (const std::vector<int>& arm : robot.roles.arms)
+    for (const int j : arm) limits[j] = std::min(kArmSpeed, robot.joints[j].velocity);
+  return limits;
 }
 
 // The bounds of the way to the stance: those of an arm, from wherever the joint is.
@@ -64,6 +80,8 @@ RobotGuard::RobotGuard(const GuardSetup& setup, FrameTransport& transport, Veloc
   status_.limited.q.setZero(kG1Motors);
   status_.limited.kp = status_.limited.kd = status_.restart_q = status_.limited.q;
   next_.period = setup_.limiter.dt;
+  speed_limits_ = speed_limits(*setup_.limiter.robot);
+  speed_shares_.fill(Eigen::VectorXd::Zero(kG1Motors));
 }
 
 void RobotGuard::receive(const PlannerMessage& message, double now) {
@@ -154,6 +172,7 @@ void RobotGuard::read_states(double now) {
       case FrameFault::kNone:
         ++status_.states;
         next_.state_at = now;
+        watch_speeds();
         continue;
       case FrameFault::kRepeated:
         continue;
@@ -169,6 +188,14 @@ void RobotGuard::read_states(double now) {
     }
     ++next_.bad_states;
   }
+}
+
+// A single sample is no speed: encoders are noisy, and a foot that lands shakes its ankle for a moment.
+void RobotGuard::watch_speeds() {
+  std::swap(speed_shares_[2], speed_shares_[1]);
+  std::swap(speed_shares_[1], speed_shares_[0]);
+  speed_shares_[0] = reading_.state.v.cwiseAbs().cwiseQuotient(speed_limits_);
+  reading_.health.joint_speed_share = speed_shares_[0].cwiseMin(speed_shares_[1]).cwiseMin(speed_shares_[2]).maxCoeff();
 }
 
 // Reads the remote control, which counts only while states arrive that carry it.

@@ -104,6 +104,7 @@ class RobotGuard {
  private:
   void count_streams();
   void read_states(double now);
+  void watch_speeds();
   void read_operator(double now);
   void check_robot();
   void follow_stance();
@@ -131,6 +132,8 @@ class RobotGuard {
   BatteryReading battery_;
   double battery_at_ = kNever;
   RobotReading reading_;
+  Eigen::VectorXd speed_limits_;                 // of the joints [rad/s]
+  std::array<Eigen::VectorXd, 3> speed_shares_;  // of these, in the last states, the newest first
   RobotState measured_;
   std::vector<AxisState> stance_;  // of all joints, on the way to the stance
   JointCommand joints_;

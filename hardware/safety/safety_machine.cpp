@@ -189,7 +189,7 @@ void assess_robot(const SafetyRules& rules, const SafetyInput& input, const BadS
   worsen(all, level_of(input.now - input.state_at, rules.state), StopCause::kStateAge);
   worsen(all, level_of_bad_states(rules, bad, input.now), StopCause::kBadStates);
   worsen(all, level_of(health.tilt, {kNoLimit, rules.hold_tilt, rules.damp_tilt}), StopCause::kTilt);
-  worsen(all, hold_if(!(health.joint_speed <= rules.joint_speed)), StopCause::kJointSpeed);
+  worsen(all, hold_if(!(health.joint_speed_share <= rules.joint_speed_share)), StopCause::kJointSpeed);
   worsen(all, hold_if(!(health.gyro <= rules.gyro)), StopCause::kGyro);
   worsen(all, level_of(health.casing, {rules.warn_casing, rules.hold_casing}), StopCause::kTemperature);
   worsen(all, level_of(health.winding, {rules.warn_winding, rules.hold_winding}), StopCause::kTemperature);

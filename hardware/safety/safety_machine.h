@@ -67,7 +67,8 @@ struct SafetyRules {
   double hold_bad_time = 0.050;              // [s]
   double odometry_jump = 0.1;                // [m]
   double hold_tilt = 0.5, damp_tilt = 1.0;   // [rad]
-  double joint_speed = 10.0, gyro = 6.0;     // [rad/s]
+  double joint_speed_share = 1.0;            // RobotHealth
+  double gyro = 6.0;                         // [rad/s]
   // A warning is no reason to stop, but keeps it from being armed.
   double warn_casing = 75.0, hold_casing = 85.0;  // [degrees C]
   double warn_winding = 100.0, hold_winding = 120.0;
@@ -86,6 +87,7 @@ struct SafetyRules {
 struct RobotHealth {
   double tilt = 0.0;                   // of the base's z axis from upright [rad]
   double joint_speed = 0.0;            // largest size [rad/s]
+  double joint_speed_share = 0.0;      // of its limit that a joint used in each of the last three states, the largest
   double gyro = 0.0;                   // size [rad/s]
   double casing = 0.0, winding = 0.0;  // hottest motor [degrees C]
   double charge = 100.0;               // [%]; NaN: not known, which holds

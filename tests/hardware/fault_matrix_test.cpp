@@ -83,7 +83,7 @@ std::vector<WireFault> wire_faults() {
           {"nan torque", in_each([](LowStateFrame& f) { f.motor[5].tau_est = kNan; }), S::kHold, C::kBadStates, 0.050},
           {"nan imu", in_each([](LowStateFrame& f) { f.imu.quaternion[0] = kNan; }), S::kHold, C::kBadStates, 0.050},
           {"nan gyro", in_each([](LowStateFrame& f) { f.imu.gyroscope[0] = kNan; }), S::kHold, C::kBadStates, 0.050},
-          {"huge speed", in_each([](LowStateFrame& f) { f.motor[5].dq = 1e30f; }), S::kHold, C::kJointSpeed, 0.0},
+          {"huge speed", in_each([](LowStateFrame& f) { f.motor[5].dq = 1e30f; }), S::kHold, C::kJointSpeed, 0.004},
           {"wrong mode_machine", in_each([](LowStateFrame& f) { f.mode_machine = 6; }), S::kHold, C::kMode, 0.0},
           {"wrong mode_pr", in_each([](LowStateFrame& f) { f.mode_pr = 1; }), S::kHold, C::kMode, 0.0},
           {"remote lost", in_each([](LowStateFrame& f) { std::fill_n(f.wireless_remote, kRemoteBytes, 0); }), S::kHold,
@@ -159,12 +159,40 @@ TEST(FaultMatrix, EachConditionOfTheRobotReachesItsState) {
     GuardedTwin robot;
     robot.start();
     c.change(robot.twin.condition);
-    EXPECT_LE(robot.time_to_leave(SafetyState::kRun), 2.5 * kTick) << c.name;
+    const double within = c.cause == StopCause::kJointSpeed ? 4.5 : 2.5;  // three samples
+    EXPECT_LE(robot.time_to_leave(SafetyState::kRun), within * kTick) << c.name;
     EXPECT_EQ(robot.state(), c.reached) << c.name;
     EXPECT_EQ(robot.cause(), c.cause) << c.name;
     robot.run_for(1.0);
     expect_inside(robot, c.name);
   }
+}
+
+// The robot runs, and one joint reports a speed in so many states, one after the other.
+SafetyState after_fast_states(int joint, double speed, int states) {
+  GuardedTwin robot;
+  robot.start();
+  int left = states;
+  robot.spoil = [&](GuardedTwin::Frames& frames) {
+    for (LowStateFrame& frame : frames) {
+      if (left-- > 0) frame.motor[joint].dq = static_cast<float>(speed);
+      seal(frame);
+    }
+  };
+  robot.run_for(0.1);
+  EXPECT_EQ(robot.state() == SafetyState::kHold, robot.cause() == StopCause::kJointSpeed) << joint;
+  return robot.state();
+}
+
+TEST(FaultMatrix, ASpeedCountsAfterThreeStatesByTheJointsOwnLimit) {
+  const std::vector<int>& leg = test::g1()->roles.legs[0];
+  const int shoulder = test::g1()->roles.arms[1][0], knee = leg[3], ankle = leg[4];
+  for (const auto& [joint, most] : {std::pair{shoulder, 10.0}, {knee, 15.0}, {ankle, 18.5}, {leg[0], 24.0}})
+    for (const double sign : {1.0, -1.0}) {
+      EXPECT_EQ(after_fast_states(joint, sign * 3.0 * most, 2), SafetyState::kRun) << joint;
+      EXPECT_EQ(after_fast_states(joint, sign * (most - 0.1), 20), SafetyState::kRun) << joint;
+      EXPECT_EQ(after_fast_states(joint, sign * (most + 0.1), 3), SafetyState::kHold) << joint;
+    }
 }
 
 TEST(FaultMatrix, APlannerThatDiesHoldsWithoutEnd) {

@@ -234,7 +234,7 @@ LAX_OF_CONTACT = {'shoulder_torque': 1e9, 'wrist_torque': 1e9, 'release_effort':
 # The value of each rule with which the rule is missing.
 LAX_RULES = {'hold_bad_states': 1000000, 'hold_bad_time': 0,
              'odometry_jump': 1e9, 'hold_tilt': 1e9,
-             'damp_tilt': 1e9, 'joint_speed': 1e9, 'gyro': 1e9, 'warn_casing': 1e9, 'hold_casing': 1e9,
+             'damp_tilt': 1e9, 'joint_speed_share': 1e9, 'gyro': 1e9, 'warn_casing': 1e9, 'hold_casing': 1e9,
              'warn_winding': 1e9, 'hold_winding': 1e9, 'warn_charge': -1, 'hold_charge': -1}
 AGES = {'state': 'warn hold damp', 'planner': 'hold', 'person': 'warn hold', 'odometry': 'warn hold',
         'remote': 'warn hold', 'loop': 'warn hold', 'executor': 'warn hold', 'writer': 'warn damp'}

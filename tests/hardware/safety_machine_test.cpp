@@ -125,7 +125,7 @@ std::vector<Fault> faults() {
           {"odometry jump", [](SafetyInput& in) { in.odometry_step = 0.2; }, SafetyState::kHold, 0.0},
           {"tilt", [](SafetyInput& in) { in.health.tilt = 0.7; }, SafetyState::kHold, 0.0},
           {"fall", [](SafetyInput& in) { in.health.tilt = 1.2; }, SafetyState::kDamp, 0.0},
-          {"joint speed", [](SafetyInput& in) { in.health.joint_speed = 12.0; }, SafetyState::kHold, 0.0},
+          {"joint speed", [](SafetyInput& in) { in.health.joint_speed_share = 1.2; }, SafetyState::kHold, 0.0},
           {"gyro", [](SafetyInput& in) { in.health.gyro = 7.0; }, SafetyState::kHold, 0.0},
           {"hot winding", [](SafetyInput& in) { in.health.winding = 130.0; }, SafetyState::kHold, 0.0},
           {"hot casing", [](SafetyInput& in) { in.health.casing = 90.0; }, SafetyState::kHold, 0.0},

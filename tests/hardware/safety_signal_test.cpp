@@ -168,7 +168,7 @@ TEST(SafetySignals, TheRobotsHealthWarnsHoldsOrDamps) {
   constexpr double kALittle = 1e-3;
   for (const Threshold& t :
        {Threshold{"tilt", &RobotHealth::tilt, kForever, 0.5, 1.0, StopCause::kTilt},
-        Threshold{"joint speed", &RobotHealth::joint_speed, kForever, 10.0, kForever, StopCause::kJointSpeed},
+        Threshold{"joint speed", &RobotHealth::joint_speed_share, kForever, 1.0, kForever, StopCause::kJointSpeed},
         Threshold{"gyro", &RobotHealth::gyro, kForever, 6.0, kForever, StopCause::kGyro},
         Threshold{"casing", &RobotHealth::casing, 75.0, 85.0, kForever, StopCause::kTemperature},
         Threshold{"winding", &RobotHealth::winding, 100.0, 120.0, kForever, StopCause::kTemperature}}) {
