@@ -84,7 +84,7 @@ void HomieExecutor::send(const VelocityCommand& velocity) {
 }
 
 void HomieExecutor::publish(const VelocityCommand& velocity) {
-  const PedalCommand pedal{{velocity.forward, velocity.lateral, velocity.yaw_rate, velocity.height}};
+  const PedalCommand pedal{{velocity.forward, velocity.lateral, velocity.yaw_rate / kHomieYawShare, velocity.height}};
   (void)channel_.send(std::span<const std::byte>(buffer_).first(encode(pedal, sequence_++, buffer_)));
   if (has_arms_) (void)channel_.send(std::span<const std::byte>(buffer_).first(encode(arms_, sequence_++, buffer_)));
 }

@@ -59,6 +59,7 @@ void FakeHomie::receive(std::span<const std::byte> datagram, double now) {
       return;
     }
     velocity_ = pedal.command;
+    velocity_[2] *= kHomieYawShare;
     ++traffic_.pedals;
     if (traffic_.last_pedal != kNever) traffic_.longest_gap = std::max(traffic_.longest_gap, now - traffic_.last_pedal);
     traffic_.last_pedal = now;

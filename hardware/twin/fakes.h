@@ -35,7 +35,7 @@ class FakeHomie {
   // Writes what HOMIE's controller echoes; returns the datagram's length.
   static std::size_t write_echo(const RobotReading& reading, std::uint32_t sequence, LcmBuffer& buffer);
 
-  [[nodiscard]] const std::array<double, 4>& velocity() const { return velocity_; }  // the last, however old
+  [[nodiscard]] const std::array<double, 4>& velocity() const { return velocity_; }  // that it walks with, however old
   [[nodiscard]] const HomieTraffic& traffic() const { return traffic_; }
   [[nodiscard]] bool has_arms() const { return arms_.has_value(); }
 

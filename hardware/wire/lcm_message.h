@@ -16,7 +16,12 @@ namespace duet {
 inline constexpr int kLcmJoints = 29;
 inline constexpr int kLcmArmJoints = 14;  // motors 15 to 28
 
-// Channel "pedal_command": velocity and height, in the heading frame. [m/s, m/s, rad/s, m]
+// The share of a rate of turn that HOMIE makes of the one it is told: its deployment scales by 0.25 what its training
+// scaled by 0.5.
+inline constexpr double kHomieYawShare = 0.5;
+
+// Channel "pedal_command": velocity and height, in the heading frame; the rate of turn in 1 / kHomieYawShare of what is
+// meant. [m/s, m/s, rad/s, m]
 struct PedalCommand {
   static constexpr std::string_view kChannel = "pedal_command";
   std::array<double, 4> command{};

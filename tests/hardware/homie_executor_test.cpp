@@ -72,6 +72,20 @@ TEST(HomieExecutor, TellsVelocityAndFourteenArmJointsInTheirOrder) {
   EXPECT_EQ(homie.traffic().refused, 0);
 }
 
+// Its deployment makes half of a rate of turn.
+TEST(HomieExecutor, AsksForTwiceTheRateOfTurn) {
+  LcmChannel listener(own_group());
+  HomieExecutor executor(own_group(), 0.74, kGuardDt);
+  executor.open();
+  executor.send({0.2, -0.1, 0.3, 0.7});
+  LcmBuffer buffer;
+  bool own = false;
+  const std::size_t size = listener.receive(buffer, own);
+  PedalCommand pedal;
+  ASSERT_TRUE(decode(std::span<const std::byte>(buffer).first(size), pedal).refusal.empty());
+  EXPECT_EQ(pedal.command, (std::array<double, 4>{0.2, -0.1, 0.6, 0.7}));
+}
+
 TEST(HomieExecutor, SpeaksFiftyTimesASecondAndDampingKeepsTheArms) {
   LcmChannel listener(own_group());
   HomieExecutor executor(own_group(), 0.74, kGuardDt);
