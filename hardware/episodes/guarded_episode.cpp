@@ -25,7 +25,7 @@ GuardedEpisode guarded_episode(const RolloutSetup& setup, const RobotModel& robo
                                const PointTracks& partner) {
   GuardedEpisode episode;
   episode.limits = options.config.limits;
-  episode.steps_from = options.steps_from;
+  episode.least_steps = options.least_steps;
   for (const std::vector<int>& arm : robot.roles.arms)
     episode.joints.insert(episode.joints.end(), arm.begin(), arm.end());
   episode.act_begin = setup.reference.phases.act_begin;
@@ -201,7 +201,7 @@ GuardedWorld::GuardedWorld(GuardedEpisode episode, std::shared_ptr<const RobotMo
     : episode_(std::move(episode)),
       robot_(std::move(robot)),
       link_(link),
-      velocity_(episode_.odometry, episode_.limits, episode_.steps_from),
+      velocity_(episode_.odometry, episode_.limits, episode_.least_steps),
       fall_(robot_->fall) {
   message_to_guard_.command.q = robot_->neutral;
   target_ = robot_->neutral;

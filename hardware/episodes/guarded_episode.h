@@ -42,7 +42,7 @@ PartnerSource partner_of_clip(PointTracks partner, const TwinCamera& camera = {}
 struct GuardedEpisode {
   OdometrySource odometry = OdometrySource::kTwin;
   HardwareLimits limits;
-  double steps_from = 0.0;         // of the walking controller: RootVelocity
+  LeastSteps least_steps = {};     // of the walking controller: RootVelocity
   std::vector<int> joints;         // that the guard's limiter moves: what is executed of the reference beside the root
   int act_begin = 0, act_end = 0;  // ticks in which the task's parts may touch
   PartnerSource person = {};       // empty: the guard hears of nobody
@@ -120,7 +120,7 @@ struct GuardedOptions {
   bool own_camera = false;  // the guard hears of the person from an estimator; else, beside a twin, from the clip by
   TwinCamera camera = {};
   bool policy_sees_clip = false;  // beside a twin: the policy sees the clip's partner in the place of the tracked one
-  double steps_from = 0.0;        // of the walking controller [m/s]
+  LeastSteps least_steps = {};    // of the walking controller
   std::string engine;             // that stands in the row: "twin"
   std::string recording;          // path of the recording to make (NPZ); empty: none
   std::function<void(const GuardReport&)> watch = {};

@@ -23,10 +23,11 @@ bool has_descriptor(const std::string& controller) {
 
 }  // namespace
 
-double least_step_speed(const std::string& controller) {
-  if (!has_descriptor(controller)) return 0.0;
+LeastSteps least_steps(const std::string& controller) {
+  if (!has_descriptor(controller)) return {};
   const Descriptor descriptor = load_descriptor(controller);
-  return descriptor.command ? descriptor.command->forward.steps_from : 0.0;
+  if (!descriptor.command) return {};
+  return {.forward = descriptor.command->forward.steps_from, .yaw = descriptor.command->yaw.steps_from};
 }
 
 bool is_told_velocities(const std::string& controller) {
@@ -42,23 +43,23 @@ std::function<std::unique_ptr<Walker>()> Walker::load(const std::string& control
   const ControllerInfo info = controller_info(controller);
   require(info.walks, "walker: expected a controller that walks, found '{}'", controller);
   check_controller_options(info, options);
-  const double steps_from = least_step_speed(controller);
+  const LeastSteps least = duet::least_steps(controller);
   if (is_told_velocities(controller)) {
     return [=, make = load_told(controller, robot, options).make] {
       auto told = std::make_shared<VelocityCommand>();
       return std::unique_ptr<Walker>(
-          new Walker(controller, steps_from, robot, told, make_guarded(make(options, told), robot)));
+          new Walker(controller, least, robot, told, make_guarded(make(options, told), robot)));
     };
   }
   return [=, make = load_controller(controller, robot, options).make] {
-    return std::unique_ptr<Walker>(new Walker(controller, steps_from, robot, nullptr, make(options)));
+    return std::unique_ptr<Walker>(new Walker(controller, least, robot, nullptr, make(options)));
   };
 }
 
-Walker::Walker(std::string name, double steps_from, std::shared_ptr<const RobotModel> robot,
+Walker::Walker(std::string name, const LeastSteps& least, std::shared_ptr<const RobotModel> robot,
                std::shared_ptr<VelocityCommand> told, std::unique_ptr<Controller> controller)
     : name_(std::move(name)),
-      steps_from_(steps_from),
+      least_(least),
       robot_(std::move(robot)),
       told_(std::move(told)),
       controller_(std::move(controller)) {
@@ -100,22 +101,14 @@ const JointCommand& Walker::update(const RobotState& state, const VelocityComman
 
 namespace {
 
-VelocityInterface interface_of(const HardwareLimits& limits, double steps_from) {
-  return {.forward = {-limits.backward, limits.forward, steps_from},
-          .lateral = {-limits.lateral, limits.lateral, 0.0},
-          .yaw = {-limits.yaw_rate, limits.yaw_rate, 0.0},
-          .height = {limits.height - limits.height_range, limits.height + limits.height_range, 0.0},
-          .height_offset = 0.0};
-}
-
 bool is_finite(const OdometrySample& sample) {
   return sample.X_WB.p.allFinite() && sample.X_WB.R.coeffs().allFinite() && sample.v_WB.allFinite();
 }
 
 }  // namespace
 
-RootVelocity::RootVelocity(OdometrySource source, const HardwareLimits& limits, double steps_from)
-    : conversion_(RootConversionLaw::kAdopted, interface_of(limits, steps_from)), height_(limits.height) {
+RootVelocity::RootVelocity(OdometrySource source, const HardwareLimits& limits, const LeastSteps& least)
+    : law_(limits, least), height_(limits.height) {
   require(source != OdometrySource::kNone,
           "root velocity: expected a source of odometry (legs, external, vendor, twin), found none: supplement A.4.3 "
           "needs the measured place and speed of the root");
@@ -125,12 +118,12 @@ VelocityCommand RootVelocity::update(const OdometrySample& odometry, const Refer
                                      double most_age) {
   const double age = now - odometry.at;
   if (!odometry.valid || !is_finite(odometry) || !(age >= 0.0 && age <= most_age)) {
-    conversion_.reset();
+    law_.reset();
     return {0.0, 0.0, 0.0, height_};
   }
   state_.X_WB = odometry.X_WB;
   state_.v_WB = odometry.v_WB;
-  return conversion_.update(state_, reference, Eigen::Vector3d::Zero(), 0.0);
+  return law_.update(state_, reference.X_WB);
 }
 
 }  // namespace duet

@@ -11,13 +11,14 @@
 
 #include "duet/controllers/controller.h"
 #include "duet/controllers/root_conversion.h"
+#include "duet/hardware/guard/goal_walk.h"
 #include "duet/hardware/safety/limits.h"
 #include "duet/hardware/wire/robot_wire.h"
 
 namespace duet {
 
-// The least forward speed that a controller answers by a step, as its descriptor says it; 0 where it has none [m/s].
-double least_step_speed(const std::string& controller);
+// The least speeds that a controller answers by a step, as its descriptor says them; 0 where it has none.
+LeastSteps least_steps(const std::string& controller);
 // Whether a controller is told velocities, as its descriptor says it.
 bool is_told_velocities(const std::string& controller);
 
@@ -37,17 +38,17 @@ class Walker {
   const JointCommand& update(const RobotState& state, const VelocityCommand& velocity, const Eigen::VectorXd& q);
 
   [[nodiscard]] const std::string& name() const { return name_; }
-  // The least forward speed that it answers by a step [m/s].
-  [[nodiscard]] double steps_from() const { return steps_from_; }
+  // The least speeds that it answers by a step.
+  [[nodiscard]] const LeastSteps& least_steps() const { return least_; }
   [[nodiscard]] ControllerFaults faults() const { return controller_->faults(); }
 
  private:
-  Walker(std::string name, double steps_from, std::shared_ptr<const RobotModel> robot,
+  Walker(std::string name, const LeastSteps& least, std::shared_ptr<const RobotModel> robot,
          std::shared_ptr<VelocityCommand> told, std::unique_ptr<Controller> controller);
   void lead(const RobotState& state, const VelocityCommand& velocity);
 
   std::string name_;
-  double steps_from_ = 0.0;
+  LeastSteps least_;
   std::shared_ptr<const RobotModel> robot_;
   std::shared_ptr<VelocityCommand> told_;  // null: the root that moves is what it follows
   std::unique_ptr<Controller> controller_;
@@ -56,23 +57,22 @@ class Walker {
   JointCommand command_;
 };
 
-// From the planner's root pose to the velocity that a walking controller is told, on a robot: the law of supplement
-// A.4.3 in its reading that stops (controllers/root_conversion.h), fed by measured odometry. No allocation.
+// From the planner's root pose to the velocity that a walking controller is told, on a robot: the law of
+// hardware/guard/goal_walk.h, fed by measured odometry. No allocation.
 class RootVelocity {
  public:
   // Throws std::invalid_argument where nobody measures place and speed of the root (OdometrySource::kNone).
-  // `steps_from`: the least forward speed that the walking controller answers by a step [m/s]; nothing slower than it
-  // is asked for where the limit allows it.
-  RootVelocity(OdometrySource source, const HardwareLimits& limits, double steps_from = 0.0);
+  // `least`: of the walking controller; nothing slower is asked for where the limits allow it.
+  RootVelocity(OdometrySource source, const HardwareLimits& limits, const LeastSteps& least = {});
 
-  void reset() { conversion_.reset(); }
+  void reset() { law_.reset(); }
   // `reference`: pose of the root in the frame of odometry. Where the sample is invalid, not finite or older than
   // `most_age` [s], the answer is to stand, and the law begins anew with the next good one.
   VelocityCommand update(const OdometrySample& odometry, const Reference& reference, double now,
                          double most_age = SafetyRules{}.odometry.hold);
 
  private:
-  RootConversion conversion_;
+  GoalWalk law_;
   double height_;  // where it stands [m]
   RobotState state_;
 };

@@ -369,6 +369,7 @@ void add_hardware(CLI::App& app, Session& session) {
   add_see(*hardware, session);
   add_calibrate(*hardware, session);
   add_holds(*hardware, session);
+  add_walks(*hardware, session);
   add_log_commands(*hardware, session);
   arm->add_option("--walker", arguments->walker, "controller that keeps it on its feet (homie, wbc_sim, ...)");
   arm->add_option("--network", arguments->walker_network, "of the walker");

@@ -34,6 +34,9 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
 // `duet hw holds`: every cause of a hold over the twin, and whether the robot stays on its feet.
 void add_holds(CLI::App& hardware, Session& session);
 
+// `duet hw walks`: random places over the twin, and how near to them the robot comes to rest.
+void add_walks(CLI::App& hardware, Session& session);
+
 // `duet hw report` and `duet hw status`.
 void add_log_commands(CLI::App& hardware, Session& session);
 // Tells `duet hw status`, where it waits beside the guard's socket, how the guard is: 10 times a second.

@@ -139,7 +139,7 @@ class TwinEpisodes {
     std::unique_ptr<Walker> walker = make_walker_();
     GuardedOptions options;
     options.config = config_;
-    options.steps_from = walker->steps_from();
+    options.least_steps = walker->least_steps();
     options.engine = fmt::format("twin-{}", arguments_.engine);
     options.camera = camera_;
     options.camera.seed = spec.seed;
@@ -355,7 +355,7 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
   GuardedOptions options;
   options.config = config;
   options.own_camera = config.has_camera;
-  options.steps_from = least_step_speed(arguments.walker);
+  options.least_steps = least_steps(arguments.walker);
   options.engine = config.twin ? "twin" : "robot";
   options.recording = arguments.recording;
   catch_interrupts();

@@ -9,6 +9,7 @@
 #include "duet/core/robot_state.h"
 #include "duet/hardware/episodes/guarded_episode.h"
 #include "duet/hardware/episodes/hold_trial.h"
+#include "duet/hardware/episodes/walk_trial.h"
 #include "duet/hardware/twin/lock_step.h"
 #include "tests/backends/engine_names.h"
 #include "tests/hardware/guarded_twin.h"
@@ -78,7 +79,7 @@ Rollout walk(const std::string& controller, const ControllerOptions& options, do
   auto walker = std::make_unique<Walker>(controller, options, test::g1());
   GuardedEpisode guarded;
   guarded.joints = test::arms_of(*test::g1()).joints;
-  guarded.steps_from = walker->steps_from();
+  guarded.least_steps = walker->least_steps();
   guarded.watch = [causes](const GuardReport& report) {
     if (causes != nullptr) causes->insert(report.cause);
   };
@@ -117,14 +118,39 @@ TEST(Walker, WbcSimStandsTheTwinBehindTheGuard) {
   EXPECT_GT(rollout.recording.robot.back().X_WB.p.z(), 0.65);
 }
 
-// In a step its ankles are faster than the envelope lets any joint be, and the guard holds it, on its feet.
-TEST(Walker, WbcSimsStepsAreFasterThanTheGuardLetsAJointBe) {
+// In a step its ankles are faster than 10 rad/s, which only an arm's joints may not be.
+TEST(Walker, WbcSimWalksTheTwinBehindTheGuard) {
   if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
   std::set<StopCause> causes;
   const Rollout rollout = walk("wbc_sim", {}, 0.6, &causes);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
-  EXPECT_TRUE(causes.contains(StopCause::kJointSpeed));
+  EXPECT_FALSE(causes.contains(StopCause::kJointSpeed));
+  EXPECT_GT(gone(rollout), 0.3);
   EXPECT_FALSE(has_fallen(rollout.recording.robot.back(), test::g1()->fall));
+}
+
+// A small version of `duet hw walks`: behind, to the side, and ahead with its back to where it came from.
+TEST(WalkTrial, HomieGetsToAPlaceInAnyDirection) {
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  if (test::shared_file("models/homie_deploy.onnx").empty()) GTEST_SKIP() << "not run: homie_deploy.onnx absent";
+  const auto make_walker = Walker::load("homie", homie_options(), test::g1());
+  for (const WalkGoal& goal : {WalkGoal{0.8, 3.0, 0.3}, WalkGoal{0.5, -1.6, -1.5}, WalkGoal{1.2, 0.2, 2.8}}) {
+    const WalkTrial trial = run_walk_trial(goal, {}, make_walker(), 11);
+    EXPECT_TRUE(trial.reached()) << goal.direction << ": " << trial.off << " m, " << trial.turned_off << " rad, "
+                                 << trial.said;
+    EXPECT_LE(trial.beyond, 0.03) << goal.direction;  // less than it sways
+  }
+}
+
+// What the trial would see of a law that stops too early.
+TEST(WalkTrial, ARobotThatDoesNotWalkHasNotReachedIt) {
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  const WalkTrial trial =
+      run_walk_trial({0.18, 0.0, 0.0}, {}, std::make_unique<Walker>("wbc_sim", ControllerOptions{}, test::g1()), 11);
+  EXPECT_TRUE(trial.stands);
+  EXPECT_FALSE(trial.reached());
+  EXPECT_NEAR(trial.off, 0.18, 0.05);
+  EXPECT_LT(trial.beyond, 0.0);
 }
 
 TEST(Walker, WithoutAWalkerTheTwinFallsAndTheGuardStops) {
