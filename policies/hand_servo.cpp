@@ -132,13 +132,12 @@ class HandServo final : public Policy {
 
   // Where the partner's hand will be in so many seconds if it goes on as it was seen to go.
   [[nodiscard]] Eigen::Vector3d seen(const Observation& observation, int theirs, double ahead) const {
-    const int joint = theirs == 0 ? kLeftHand : kRightHand, seen = static_cast<int>(observation.history.size());
-    const int frames = std::min(ticks_of(bounds_.look), seen);
+    const int joint = theirs == 0 ? kLeftHand : kRightHand, frames = static_cast<int>(observation.history.size());
     Eigen::Vector3d moment = Eigen::Vector3d::Zero();
     double spread = 0.0;
     for (int i = 0; i < frames; ++i) {
       const double t = (i - 0.5 * (frames - 1)) / kTickRate;
-      moment += t * observation.history[seen - frames + i].partner.col(joint);
+      moment += t * observation.history[i].partner.col(joint);
       spread += t * t;
     }
     const Eigen::Vector3d now = observation.now().partner.col(joint);

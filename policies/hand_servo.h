@@ -17,7 +17,6 @@ struct HandServoBounds {
   double far = 0.30, near = 0.20;  // distance of the reference's hand from the partner's seen one [m]
   double low = 0.08, high = 0.16;  // rise of the partner's hand over the lowest place that it had [m]
   double ahead = 0.03;             // the hand is met where it will be then, at its present speed [s]
-  double look = 0.10;              // that speed is of the last so many seconds [s]
   double stretch = 0.98;           // the hand goes no farther from the shoulder, of the arm's length [1]
   double joint_rate = 3.0;         // of a joint's correction [rad/s]
   double horizon = 1.0;            // the root's counts where the plan comes near within this [s]

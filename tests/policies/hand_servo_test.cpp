@@ -71,9 +71,8 @@ ObservationFrame facing() {
 // The references of two seconds in which the partner's hand is at `hand` after a fifth of a second. The robot is where
 // its plan wants it.
 std::vector<Reference> corrected(Task task, const Reference& wanted, const Eigen::Vector3d& hand,
-                                 const std::function<void(ObservationFrame&)>& disturb = {},
-                                 const HandServoBounds& bounds = {}) {
-  const std::unique_ptr<Policy> policy = with_hand_servo(std::make_unique<Holding>(wanted), g1(), bounds);
+                                 const std::function<void(ObservationFrame&)>& disturb = {}) {
+  const std::unique_ptr<Policy> policy = with_hand_servo(std::make_unique<Holding>(wanted), g1());
   policy->reset({.task = task, .prompt = "", .start = facing().robot});
   ObservationHistory history;
   std::vector<Reference> references;
@@ -107,22 +106,7 @@ TEST(HandServo, BringsTheHandToTheOneThatIsHeldOut) {
   }
 }
 
-// A hand that came up quickly and stops is taken to go on for no longer than its speed is looked at.
-TEST(HandServo, MeetsAHandThatHasStoppedWhereItIs) {
-  const Eigen::Vector3d hand = held_out(-0.08);
-  constexpr int kSettled = kTicksPerPlan + 8;  // ticks: a longer look still sees the way up
-  const auto misses = [&](double look) {
-    HandServoBounds bounds;
-    bounds.joint_rate = 30.0;
-    bounds.look = look;
-    Reference reference = corrected(Task::kHandshake, offering(), hand, {}, bounds)[kSettled];
-    reference.X_WB = offering().X_WB;
-    return (hand_of(reference) - hand).norm();
-  };
-  EXPECT_LT(misses(kBounds.look), 0.01);
-  EXPECT_GT(misses(0.22), 0.02);
-}
-
+// A hand that comes quickly is taken to go on.
 TEST(HandServo, LeavesAPlanToTheBitThatIsFarFromTheHand) {
   for (const Reference& reference : corrected(Task::kHandshake, offering(), held_out(kBounds.far + 0.15)))
     EXPECT_TRUE(same_reference(reference, offering()));
