@@ -360,6 +360,20 @@ def arena_order(*boards):
     return markdown(header, [False] + [True] * (1 + len(columns)), table)
 
 
+def jitter(folder):
+    """Table S4: jitter of the reference and of the robot, and the robot's distance from the reference, ours before the supplement's."""
+    rows = [r for r in rows_of(folder, "controllers.csv") if r["policy"].lower() in ("dstar", "d-star", "dp")]
+    pairs = {"HF ratio": "hf_ratio", "DOF jerk [rad/s³]": "dof_jerk", "Root jerk [m/s³]": "root_jerk"}
+    errors = {"Root error [m / deg]": ("root_error", "root_angle_error"), "Joint error [rad / rad/s]": ("dof_error", "dof_velocity_error")}
+    table = []
+    for key in dict.fromkeys((r["source"], r["policy"], r["controller"]) for r in rows):
+        of = {r["name"]: float(r["value"]) for r in rows if (r["source"], r["policy"], r["controller"]) == key}
+        cells = [f"{of[name + '_reference']:.3g} → {of[name]:.3g}" if name == "hf_ratio" else f"{of[name + '_reference']:.0f} → {of[name]:.0f}" for name in pairs.values()]
+        cells += [" / ".join(f"{of[name]:.3g}" for name in names) for names in errors.values()]
+        table.append([key[1] if key[0] == "duet" else f"{key[1]} (supplement)", key[2], *cells])
+    return markdown(["Policy", "Controller", *pairs, *errors], [False, False] + [True] * 5, table)
+
+
 def suites(program):
     """The suites that ship, what each asks, and whether its rows are published."""
     found = json.loads(output([program, "list", "suites", "--json"]))
@@ -396,10 +410,10 @@ def contents(source, program):
     if words[:1] == ["people"] and len(words) == 3:
         return people(*words[1:])
     tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
-              "actuation": actuation}
+              "actuation": actuation, "jitter": jitter}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER ENGINE ACTUATION, arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER ENGINE ACTUATION, arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, jitter FOLDER, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):

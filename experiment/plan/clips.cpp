@@ -142,12 +142,14 @@ void like_people(const SyntheticClip& source, SynthesisOptions& options) {
 // are: both people frozen in the first frame of the act. Nobody begins by himself before a partner who stands still
 // but has looked at him for longer than D-STAR's memory of 4.4 s.
 ClipPadding vary_standing(const SyntheticClip& source, SynthesisOptions& options) {
+  constexpr double kComes = 2.5, kMeanWait = 1.5;         // who is like people: for the robot to come, and after that [s]
   constexpr double kLooksFor = 5.0, kMeanPatience = 1.0;  // before a partner who stands still [s]
   Random random(source.seed, stream_key({"stands", to_string(source.task), std::to_string(source.index)}));
   const auto drawn = [&](double mean) { return -mean * std::log1p(-random.uniform()); };
-  double before = drawn(kStandingBefore);
+  const bool varied = source.like == Likeness::kVaried;
+  double before = varied ? drawn(kStandingBefore) : kComes + drawn(kMeanWait);
   const double still = definition_of(source.task).act.varied.still;
-  if (source.like == Likeness::kVaried && still > 0.0) options.still = random.chance(still);
+  if (varied && still > 0.0) options.still = random.chance(still);
   if (options.still.value_or(false)) before = kLooksFor + drawn(kMeanPatience);
   if (random.chance(0.5)) {
     options.before = before;

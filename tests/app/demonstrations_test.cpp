@@ -242,8 +242,8 @@ TEST(MakeDemonstrations, PeopleWaitForNoLengthThatCouldBeCounted) {
   std::vector<int> begins;
   for (const Demonstration& entry : set.list) begins.push_back(entry.phases.act_begin);
   const auto [shortest, longest] = std::ranges::minmax(begins);
-  EXPECT_GE(shortest, 125);  // 2.5 s
-  EXPECT_GT(longest - shortest, 75);
+  EXPECT_GE(shortest, 125);  // 2.5 s, in which the robot comes; then without memory
+  EXPECT_GT(longest, 300);
 }
 
 TEST(MakeDemonstrations, BothKindsOfClipsAreInOneSet) {
