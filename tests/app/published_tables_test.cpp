@@ -71,7 +71,8 @@ TEST_P(PublishedTables, AreWhatTheRowsSay) {
     EXPECT_TRUE(written.contains(entry.path().filename().string())) << entry.path();
 }
 INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables,
-                         testing::Values("policies", "sealed", "sealed_varied", "interaction", "lead", "real", "jitter"),
+                         testing::Values("policies", "sealed", "sealed_varied", "interaction", "lead", "real",
+                                         "jitter"),
                          [](const auto& info) { return std::string(info.param); });
 
 // The others of its tables are long, and nothing is quoted from them.
