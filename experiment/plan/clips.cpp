@@ -142,7 +142,7 @@ void like_people(const SyntheticClip& source, SynthesisOptions& options) {
 // are: both people frozen in the first frame of the act. Nobody begins by himself before a partner who stands still
 // but has looked at him for longer than D-STAR's memory of 4.4 s.
 ClipPadding vary_standing(const SyntheticClip& source, SynthesisOptions& options) {
-  constexpr double kComes = 2.5, kMeanWait = 1.5;         // who is like people: for the robot to come, and after that [s]
+  constexpr double kComes = 2.5, kMeanWait = 1.5;  // who is like people: for the robot to come, and after that [s]
   constexpr double kLooksFor = 5.0, kMeanPatience = 1.0;  // before a partner who stands still [s]
   Random random(source.seed, stream_key({"stands", to_string(source.task), std::to_string(source.index)}));
   const auto drawn = [&](double mean) { return -mean * std::log1p(-random.uniform()); };
