@@ -23,10 +23,10 @@ ContactWatch::ContactWatch(std::shared_ptr<const RobotModel> robot, const Hardwa
     : robot_(std::move(robot)),
       limits_(limits),
       least_force_(least_force),
-      ticks_to_count_(static_cast<int>(std::ceil(limits.contact_time / dt - 1e-9))),
       dynamics_(with_arms(robot_)) {
   require(dt > 0.0, "contact watch: expected a dt above 0 s, found {}", dt);
   require(least_force >= 0.0, "contact watch: expected a force of at least 0 N, found {}", least_force);
+  ticks_to_count_ = static_cast<int>(std::ceil(limits.contact_time / dt - 1e-9));
   bias_.setZero(6 + robot_->dof());
   still_.v.setZero(robot_->dof());
   still_.q.setZero(robot_->dof());

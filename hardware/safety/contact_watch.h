@@ -91,7 +91,7 @@ class ContactWatch {
   std::shared_ptr<const RobotModel> robot_;
   HardwareLimits limits_;
   double least_force_;
-  int ticks_to_count_;
+  int ticks_to_count_ = 1;
   Dynamics dynamics_;
   RobotState still_;
   Eigen::VectorXd bias_;
