@@ -20,10 +20,7 @@ const RobotModel& with_arms(const std::shared_ptr<const RobotModel>& robot) {
 
 ContactWatch::ContactWatch(std::shared_ptr<const RobotModel> robot, const HardwareLimits& limits, double least_force,
                            double dt)
-    : robot_(std::move(robot)),
-      limits_(limits),
-      least_force_(least_force),
-      dynamics_(with_arms(robot_)) {
+    : robot_(std::move(robot)), limits_(limits), least_force_(least_force), dynamics_(with_arms(robot_)) {
   require(dt > 0.0, "contact watch: expected a dt above 0 s, found {}", dt);
   require(least_force >= 0.0, "contact watch: expected a force of at least 0 N, found {}", least_force);
   ticks_to_count_ = static_cast<int>(std::ceil(limits.contact_time / dt - 1e-9));
