@@ -31,13 +31,6 @@ GuardSetup setup_of_holds() {
   return guard_setup(config, false);
 }
 
-TwinOptions twin_of(const HoldTrialSetup& setup, std::uint64_t seed) {
-  TwinOptions twin = usual_noise(setup.noise);
-  twin.engine = setup.engine;
-  twin.seed = seed;
-  return twin;
-}
-
 // The twin's own faults: kind, how long, value. Those of the rest are made by HoldRun::trouble().
 std::vector<TwinFault> faults_of(StopCause cause, double begin, double lasts) {
   switch (cause) {
@@ -70,7 +63,7 @@ class HoldRun {
         setup_(setup),
         begin_(kRunsBy + Random(seed, stream_key({"hold trial"})).uniform(0.0, kAnyStride)),
         robot_(load_shared_robot()),
-        link_(setup_of_holds(), twin_of(setup, seed), std::move(walker), nullptr,
+        link_(setup_of_holds(), noisy_twin(setup.noise, setup.engine, seed), std::move(walker), nullptr,
               faults_of(cause, begin_, setup.seconds)) {
     plan_.command.q = robot_->neutral;
     plan_.command.root.height = HardwareLimits{}.height;

@@ -16,7 +16,7 @@ struct HoldTrialSetup {
   std::string engine = "mujoco";  // behind the twin
   double forward = 0.25;          // that it walks with before it is held; 0: it stands [m/s]
   double seconds = 30.0;          // of the hold
-  double noise = 1.0;             // of the sensors, as a share of the usual (usual_noise())
+  double noise = 1.0;             // of the sensors, as a share of the usual (noisy_twin())
 };
 
 struct HoldTrial {

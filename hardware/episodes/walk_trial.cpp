@@ -26,13 +26,6 @@ GuardSetup setup_of_walks() {
   return guard_setup(config, false);
 }
 
-TwinOptions twin_of_walk(const WalkTrialSetup& setup, std::uint64_t seed) {
-  TwinOptions twin = usual_noise(setup.noise);
-  twin.engine = setup.engine;
-  twin.seed = seed;
-  return twin;
-}
-
 bool is_told_to_stand(const VelocityCommand& root) {
   return root.forward == 0.0 && root.lateral == 0.0 && root.yaw_rate == 0.0;
 }
@@ -45,7 +38,7 @@ class WalkRun {
         guard_setup_(setup_of_walks()),
         law_(OdometrySource::kTwin, guard_setup_.limiter.limits,
              walker != nullptr ? walker->least_steps() : LeastSteps{}),
-        link_(guard_setup_, twin_of_walk(setup, seed), std::move(walker), nullptr) {
+        link_(guard_setup_, noisy_twin(setup.noise, setup.engine, seed), std::move(walker), nullptr) {
     plan_.command.q = robot_->neutral;
   }
 

@@ -19,7 +19,7 @@ WalkGoal random_goal(double nearest, double furthest, std::uint64_t seed);
 
 struct WalkTrialSetup {
   std::string engine = "mujoco";  // behind the twin
-  double noise = 1.0;             // of the sensors, as a share of the usual (usual_noise())
+  double noise = 1.0;             // of the sensors, as a share of the usual (noisy_twin())
   double most_seconds = 60.0;     // from when it is told
 };
 

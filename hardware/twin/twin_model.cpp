@@ -33,8 +33,10 @@ bool is_sane(const LowCommandFrame& frame) {
 
 }  // namespace
 
-TwinOptions usual_noise(double share) {
+TwinOptions noisy_twin(double share, const std::string& engine, std::uint64_t seed) {
   TwinOptions twin;
+  twin.engine = engine;
+  twin.seed = seed;
   twin.place_noise = share * 0.002;
   twin.speed_noise = share * 0.02;
   twin.joint_noise = share * 0.002;

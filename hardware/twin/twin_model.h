@@ -72,8 +72,8 @@ struct TwinOptions {
       {};  // of backends/ that simulates its body; empty: the first-order one. Steps are then kTwinPeriod
 };
 
-// Options with the noise of a robot of this kind, as far as published training noise and data sheets go; `share` of it.
-TwinOptions usual_noise(double share);
+// A twin with the noise of a robot of this kind, as far as published training noise and data sheets go; `share` of it.
+TwinOptions noisy_twin(double share, const std::string& engine, std::uint64_t seed);
 
 inline constexpr double kTwinPeriod = 0.002;  // of states and of an engine's steps [s]
 

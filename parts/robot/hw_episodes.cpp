@@ -43,14 +43,6 @@ TwinClock parse_clock(const std::string& name) {
   throw std::invalid_argument(unknown_name_message("clock of the twin", name, kClockNames));
 }
 
-TwinOptions noisy_twin(double share, const std::string& engine, int mode_machine, std::uint64_t seed) {
-  TwinOptions twin = usual_noise(share);
-  twin.engine = engine;
-  twin.mode_machine = mode_machine;
-  twin.seed = seed;
-  return twin;
-}
-
 // The state that all episodes of a command share.
 class TwinEpisodes {
  public:
@@ -123,8 +115,8 @@ class TwinEpisodes {
   [[nodiscard]] GuardSetup setup() const { return guard_setup(config_, false); }
 
   std::unique_ptr<GuardLink> make_link(const EpisodeSpec& spec, std::unique_ptr<Walker> walker, RunLog& log) const {
-    const TwinOptions twin =
-        noisy_twin(arguments_.noise, arguments_.engine, config_.permission.mode_machine, spec.seed);
+    TwinOptions twin = noisy_twin(arguments_.noise, arguments_.engine, spec.seed);
+    twin.mode_machine = config_.permission.mode_machine;
     if (clock_ == TwinClock::kInProcess) return std::make_unique<TwinInProcess>(setup(), twin, std::move(walker), &log);
     const TwinOverDdsOptions options{.program = twin_program(),
                                      .place = config_.place(),

@@ -142,7 +142,7 @@ TEST(WalkTrial, HomieGetsToAPlaceInAnyDirection) {
   }
 }
 
-// What the trial would see of a law that stops too early.
+// As under a law that stops too early.
 TEST(WalkTrial, ARobotThatDoesNotWalkHasNotReachedIt) {
   if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
   const WalkTrial trial =
