@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "duet/core/require.h"
 
@@ -104,29 +105,62 @@ class Guard final : public Controller {
   int stop_ticks_ = 0;
 };
 
-class DampedAtMost final : public Controller {
+// A controller whose commands are changed before they go on.
+class ChangedCommands : public Controller {
  public:
-  DampedAtMost(std::unique_ptr<Controller> controller, Eigen::VectorXd most)
-      : controller_(std::move(controller)), most_(std::move(most)) {}
+  explicit ChangedCommands(std::unique_ptr<Controller> controller) : controller_(std::move(controller)) {}
 
-  [[nodiscard]] std::string_view name() const override { return controller_->name(); }
-  [[nodiscard]] int acts_per_tick() const override { return controller_->acts_per_tick(); }
-  [[nodiscard]] ControllerFaults faults() const override { return controller_->faults(); }
-  void reset(const RobotState& state) override { controller_->reset(state); }
-  void act(const RobotState& state, const Reference& reference, JointCommand& command) override {
+  [[nodiscard]] std::string_view name() const final { return controller_->name(); }
+  [[nodiscard]] int acts_per_tick() const final { return controller_->acts_per_tick(); }
+  [[nodiscard]] ControllerFaults faults() const final { return controller_->faults(); }
+  void reset(const RobotState& state) final { controller_->reset(state); }
+  void act(const RobotState& state, const Reference& reference, JointCommand& command) final {
     controller_->act(state, reference, command);
-    command.kd = command.kd.cwiseMin(most_);
+    change(reference, command);
   }
 
  private:
+  virtual void change(const Reference& reference, JointCommand& command) const = 0;
+
   std::unique_ptr<Controller> controller_;
+};
+
+class DampedAtMost final : public ChangedCommands {
+ public:
+  DampedAtMost(std::unique_ptr<Controller> controller, Eigen::VectorXd most)
+      : ChangedCommands(std::move(controller)), most_(std::move(most)) {}
+
+ private:
+  void change(const Reference&, JointCommand& command) const override { command.kd = command.kd.cwiseMin(most_); }
+
   Eigen::VectorXd most_;
+};
+
+class ReferenceArms final : public ChangedCommands {
+ public:
+  ReferenceArms(std::unique_ptr<Controller> controller, std::vector<int> joints)
+      : ChangedCommands(std::move(controller)), joints_(std::move(joints)) {}
+
+ private:
+  void change(const Reference& reference, JointCommand& command) const override {
+    for (const int joint : joints_) command.q_target[joint] = reference.q[joint];
+  }
+
+  std::vector<int> joints_;
 };
 
 }  // namespace
 
 std::unique_ptr<Controller> make_damped_at_most(std::unique_ptr<Controller> controller, Eigen::VectorXd most) {
   return std::make_unique<DampedAtMost>(std::move(controller), std::move(most));
+}
+
+std::unique_ptr<Controller> make_reference_arms(std::unique_ptr<Controller> controller, const RobotModel& robot) {
+  std::vector<int> joints;
+  for (const std::vector<int>& arm : robot.roles.arms) joints.insert(joints.end(), arm.begin(), arm.end());
+  require(!joints.empty(), "controller '{}': option 'arms': expected a robot with arms that move, found '{}'",
+          controller->name(), robot.name);
+  return std::make_unique<ReferenceArms>(std::move(controller), std::move(joints));
 }
 
 std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,

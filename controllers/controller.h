@@ -64,6 +64,11 @@ std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
 // With kd at most `most` [N m s/rad], one per joint; all else is `controller`'s. Wraps any controller.
 std::unique_ptr<Controller> make_damped_at_most(std::unique_ptr<Controller> controller, Eigen::VectorXd most);
 
+// A controller whose arms something else moves, as a teleoperated robot's are: the targets of all joints of both arms
+// are the reference's angles; gains, the other joints and what it is shown are `controller`'s. Wraps any controller.
+// Throws std::invalid_argument for a robot without arms that move.
+std::unique_ptr<Controller> make_reference_arms(std::unique_ptr<Controller> controller, const RobotModel& robot);
+
 // The card's gains around the reference's joint angles and nothing else: no balance. It falls within about a second and
 // says so in the table; what stands longer is the other controllers' merit.
 std::unique_ptr<Controller> make_pd_controller(std::shared_ptr<const RobotModel> robot);

@@ -10,7 +10,6 @@
 
 #include "duet/controllers/controller.h"
 #include "duet/controllers/descriptor_controller.h"
-#include "duet/controllers/reference_arms.h"
 #include "duet/controllers/vmc.h"
 #include "duet/controllers/wbc_sim/wbc_sim.h"
 #include "duet/core/field.h"
