@@ -12,6 +12,8 @@
 #include "duet/core/require.h"
 #include "duet/core/robot_state.h"
 #include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/twin/lock_step.h"
+#include "duet/motion/human_motion.h"
 #include "duet/robots/robot_cards.h"
 #include "duet/rows/groups/row_groups.h"
 #include "duet/rows/json_fields.h"
@@ -28,8 +30,10 @@ GuardedEpisode guarded_episode(const RolloutSetup& setup, const RobotModel& robo
   episode.least_steps = options.least_steps;
   for (const std::vector<int>& arm : robot.roles.arms)
     episode.joints.insert(episode.joints.end(), arm.begin(), arm.end());
-  episode.act_begin = setup.reference.phases.act_begin;
-  episode.act_end = setup.reference.phases.act_end;
+  if (options.solid) {
+    require(setup.limits.has_value(), "episode: expected limits of contact for a solid person, found none");
+    episode.solid = SolidPerson{make_human_body(bone_lengths(setup.clip->partner)), *setup.limits};
+  }
   episode.watch = options.watch;
   episode.keeps_distance = options.config.twin && options.config.person;
   const bool by_clip = options.config.twin && !options.own_camera && !partner.empty();
@@ -37,6 +41,19 @@ GuardedEpisode guarded_episode(const RolloutSetup& setup, const RobotModel& robo
   episode.perceives = options.own_camera || (by_clip && !options.policy_sees_clip);
   episode.records_seen = options.own_camera;
   return episode;
+}
+
+// By the recording: where the person is, not where they were seen.
+double least_head_distance(const Recording& recording, const std::shared_ptr<const RobotModel>& robot,
+                           const HumanMotion& person) {
+  BodyDistance distance(robot, make_human_body(bone_lengths(person)), {});
+  double least = BodyGaps::kFar;
+  for (int k = 0; k < std::min(recording.frames(), recording.partner.frames()); ++k) {
+    const HumanJoints joints = recording.partner.frame(k);
+    const RobotState& state = recording.robot[static_cast<std::size_t>(k)];
+    least = std::min(least, distance.measure(state.X_WB, state.q, &joints, 0.0, false).head);
+  }
+  return least;
 }
 
 Rollout roll_out_guarded(const RolloutSetup& setup, const std::shared_ptr<const RobotModel>& robot, Policy& policy,
@@ -49,6 +66,7 @@ Rollout roll_out_guarded(const RolloutSetup& setup, const std::shared_ptr<const 
   run.clamps = world.clamps();
   run.held_ticks = world.held_ticks();
   run.unseen_ticks = world.unseen_ticks();
+  run.head_distance = least_head_distance(rollout.recording, robot, setup.clip->partner);
   run.guard_seconds = world.report().now - world.began_at();
   run.missed_reports = world.missed_reports();
   if (!options.recording.empty()) save_logged_run(rollout.recording, run.executed, options.recording);
@@ -206,8 +224,20 @@ GuardedWorld::GuardedWorld(GuardedEpisode episode, std::shared_ptr<const RobotMo
   message_to_guard_.command.q = robot_->neutral;
   target_ = robot_->neutral;
   state_ = robot_->standing_state();
+  if (episode_.solid) {
+    twin_ = link.in_process();
+    require(twin_ != nullptr, "episode: expected a twin in this process for a solid person, found {}", link.name());
+    twin_->twin().meet(episode_.solid->body);
+    ContactSafetyOptions options;
+    options.link_radius = link_radii(*robot_);
+    safety_.emplace(episode_.solid->body, episode_.solid->limits, kTwinPeriod, options);
+  }
   // Above whatever a planner before this one has sent.
   person_.sequence = message_to_guard_.sequence = static_cast<std::uint64_t>(monotonic_seconds() * 1e6);
+}
+
+GuardedWorld::~GuardedWorld() {
+  if (twin_ != nullptr) twin_->after_step = {};
 }
 
 bool GuardedWorld::next() {
@@ -262,6 +292,7 @@ void GuardedWorld::begin(const RobotState& start) {
   began_at_ = report_.now;
   clamps_before_ = report_.clamps;
   take_state();
+  if (twin_ != nullptr) twin_->after_step = [this] { safety_->add(twin_->twin().physics()->contacts()); };
 }
 
 void GuardedWorld::lay_world(const Pose& start) {
@@ -299,6 +330,33 @@ void GuardedWorld::show_person(int tick) {
   (void)link_.send(person_);
 }
 
+// On its way at the speed that the clip has; in the frame of odometry, which is the twin's own but for its noise.
+void GuardedWorld::move_person(const PointTracks& partner, int tick) {
+  if (twin_ == nullptr) return;
+  const Eigen::Quaterniond R_OE = yaw_rotation(yaw_OE_);
+  HumanJoints joints = partner_joints(partner, tick), velocities = partner_velocities(partner, tick, kTickRate);
+  for (int j = 0; j < kSmplJoints; ++j) {
+    joints.col(j) = p_OE_ + R_OE * joints.col(j).eval();
+    velocities.col(j) = R_OE * velocities.col(j).eval();
+  }
+  twin_->twin().physics()->move_person(joints, velocities);
+}
+
+void GuardedWorld::take_contacts() {
+  if (twin_ == nullptr) return;
+  const Eigen::Quaterniond R_EO = yaw_rotation(-yaw_OE_);
+  const std::span<const Contact> contacts = twin_->twin().physics()->contacts();
+  contacts_.assign(contacts.begin(), contacts.end());
+  for (Contact& contact : contacts_) {
+    contact.p_WC = R_EO * (contact.p_WC - p_OE_);
+    contact.f_W = R_EO * contact.f_W;
+  }
+}
+
+void GuardedWorld::finish(Rollout& rollout) const {
+  if (safety_) rollout.safety = safety_->result();
+}
+
 // The guard gets what the reference asks for; what it makes of it is in its next report.
 const Eigen::VectorXd& GuardedWorld::target(const Reference& reference) {
   const Reference goal{to_odometry(reference.X_WB), reference.q};
@@ -306,16 +364,18 @@ const Eigen::VectorXd& GuardedWorld::target(const Reference& reference) {
   const VelocityCommand root = velocity_.update(odometry, goal, report_.now);
   show_person(tick_);
   message_to_guard_.goal = goal.X_WB;
-  plan(root, reference.q, tick_ >= episode_.act_begin && tick_ < episode_.act_end);
+  plan(root, reference.q, true);
   target_ = report_.q_target;
   for (const int joint : episode_.joints) target_[joint] = reference.q[joint];
   return target_;
 }
 
-Outcome GuardedWorld::advance(int tick, const PointTracks&, Deadline&) {
+Outcome GuardedWorld::advance(int tick, const PointTracks& partner, Deadline&) {
   tick_ = tick + 1;
+  move_person(partner, tick);
   if (!next()) return Outcome::kError;
   take_state();
+  take_contacts();
   if (report_.state == SafetyState::kHold) ++held_ticks_;
   if (!report_.tracked) ++unseen_ticks_;
   if (has_fallen(state_, fall_)) return Outcome::kFell;
@@ -325,6 +385,7 @@ Outcome GuardedWorld::advance(int tick, const PointTracks&, Deadline&) {
 }
 
 void GuardedWorld::rest(double seconds) {
+  if (twin_ != nullptr) twin_->after_step = {};
   const double end = report_.now + seconds;
   message_to_guard_.goal.reset();
   while (report_.now < end) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #include "duet/hardware/guard/robot_connection.h"
 #include "duet/hardware/guard/walker.h"
 #include "duet/hardware/log/run_log.h"
+#include "duet/hardware/safety/contact_watch.h"
+#include "duet/metrics/contact_safety.h"
 #include "duet/rollout/rollout.h"
 #include "duet/statistics/statistics.h"
 
@@ -39,26 +42,36 @@ TwinCamera parse_twin_camera(const std::string& text);
 // A person who is where the clip has them, as an estimator sees them 30 times a second.
 PartnerSource partner_of_clip(PointTracks partner, const TwinCamera& camera = {});
 
+// A person who can be touched, beside a twin in this process.
+struct SolidPerson {
+  HumanBody body;
+  ContactLimits limits;  // that the contacts are held against
+};
+
 struct GuardedEpisode {
   OdometrySource odometry = OdometrySource::kTwin;
   HardwareLimits limits;
-  LeastSteps least_steps = {};     // of the walking controller: RootVelocity
-  std::vector<int> joints;         // that the guard's limiter moves: what is executed of the reference beside the root
-  int act_begin = 0, act_end = 0;  // ticks in which the task's parts may touch
-  PartnerSource person = {};       // empty: the guard hears of nobody
-  bool perceives = false;          // the policy sees the person whom the guard tracks, and nobody else; without one the
-                                   // episode does not begin, and one who is lost stays where they were last seen
-  bool records_seen = false;       // and so does the recording: nobody knows better
-  bool keeps_distance = false;     // the guard minds the person, who comes near once the robot runs: until then it
-                                   // would not even stand up beside them
-  double most_wait = 30.0;         // for the guard to run, by its clock [s]
+  LeastSteps least_steps = {};  // of the walking controller: RootVelocity
+  std::vector<int> joints;      // that the guard's limiter moves: what is executed of the reference beside the root
+  std::optional<SolidPerson> solid = {};
+  PartnerSource person = {};    // empty: the guard hears of nobody
+  bool perceives = false;       // the policy sees the person whom the guard tracks, and nobody else; without one the
+                                // episode does not begin, and one who is lost stays where they were last seen
+  bool records_seen = false;    // and so does the recording: nobody knows better
+  bool keeps_distance = false;  // the guard minds the person, who comes near once the robot runs: until then it
+                                // would not even stand up beside them
+  double most_wait = 30.0;      // for the guard to run, by its clock [s]
   std::function<void(const GuardReport&)> watch = {};  // of each change of state, for displays
 };
 
 class GuardedWorld final : public World {
  public:
-  // Throws as RootVelocity does. Refers to the link.
+  // Throws as RootVelocity does; std::invalid_argument for a solid person where the link has no twin with an engine in
+  // this process. Refers to the link.
   GuardedWorld(GuardedEpisode episode, std::shared_ptr<const RobotModel> robot, GuardLink& link);
+  GuardedWorld(const GuardedWorld&) = delete;  // the twin's steps refer to it
+  GuardedWorld& operator=(const GuardedWorld&) = delete;
+  ~GuardedWorld() override;
 
   // Plans to stand until the guard runs. Throws std::runtime_error, with what the guard is at, where it does not in
   // most_wait of its time, and where it has gone.
@@ -71,6 +84,8 @@ class GuardedWorld final : public World {
   [[nodiscard]] const HumanJoints* seen_partner() const override { return episode_.perceives ? &seen_ : nullptr; }
   [[nodiscard]] bool records_what_it_sees() const override { return episode_.records_seen; }
   [[nodiscard]] std::string message() const override { return message_; }
+  [[nodiscard]] std::span<const Contact> contacts() const override { return contacts_; }  // frame E
+  void finish(Rollout& rollout) const override;
 
   // Plans to stand for so long after the episode [s]; then whoever is next may have the robot.
   void rest(double seconds);
@@ -88,6 +103,8 @@ class GuardedWorld final : public World {
   void wait_for_run(const Pose& start);
   void plan(const VelocityCommand& root, const Eigen::VectorXd& q, bool acting);
   void show_person(int tick);
+  void move_person(const PointTracks& partner, int tick);
+  void take_contacts();
   void take_state();
   void lay_world(const Pose& start);
   [[nodiscard]] Pose to_odometry(const Pose& X_EB) const;
@@ -106,6 +123,9 @@ class GuardedWorld final : public World {
   PersonMessage person_;
   HumanJoints seen_ = HumanJoints::Zero();  // by the guard's camera, frame E
   Eigen::VectorXd target_;
+  TwinInProcess* twin_ = nullptr;  // where the person is solid
+  std::optional<ContactSafety> safety_;
+  std::vector<Contact> contacts_;
   int tick_ = 0;
   double stand_off_ = 0.0;  // by which the person is further away than the clip has them [m]
   SafetyState last_state_ = SafetyState::kOffline;
@@ -119,6 +139,7 @@ struct GuardedOptions {
   RobotConfig config;
   bool own_camera = false;  // the guard hears of the person from an estimator; else, beside a twin, from the clip by
   TwinCamera camera = {};
+  bool solid = false;             // the person can be touched, beside a twin in this process
   bool policy_sees_clip = false;  // beside a twin: the policy sees the clip's partner in the place of the tracked one
   LeastSteps least_steps = {};    // of the walking controller
   std::string engine;             // that stands in the row: "twin"
@@ -131,11 +152,12 @@ struct GuardedRun {
   EpisodeRow row;
   ExecutedMask executed;
   ClampCounts clamps{};
-  int held_ticks = 0;        // in which the guard held
-  int unseen_ticks = 0;      // in which it tracked nobody
-  int missed_reports = 0;    // of the guard, that were lost on their way
-  double guard_seconds = 0;  // of the episode, by the guard's clock [s]
-  bool interrupted = false;  // by stop_asked: the row is no result
+  int held_ticks = 0;                     // in which the guard held
+  int unseen_ticks = 0;                   // in which it tracked nobody
+  double head_distance = BodyGaps::kFar;  // least of the robot from the person's head and neck [m]
+  int missed_reports = 0;                 // of the guard, that were lost on their way
+  double guard_seconds = 0;               // of the episode, by the guard's clock [s]
+  bool interrupted = false;               // by stop_asked: the row is no result
 };
 
 // The episode through `link`, scored as the suite scores. Whatever ends it is an outcome; a guard that does not run is

@@ -52,6 +52,8 @@ void run_or_damp(RobotGuard& guard, const std::function<void()>& run,
 
 // A planner's way to the guard and back, be it in another process or in this one. One owner, one thread.
 
+class TwinInProcess;
+
 class GuardLink {
  public:
   virtual ~GuardLink() = default;
@@ -64,6 +66,8 @@ class GuardLink {
   [[nodiscard]] virtual double patience() const = 0;  // [s]
   // The name for messages: "the guard at 'duet-guard.socket'".
   [[nodiscard]] virtual std::string name() const = 0;
+  // The twin behind the guard, where both are in this process; null.
+  virtual TwinInProcess* in_process() { return nullptr; }
 };
 
 // A link over the guard's local socket.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <numeric>
 
 namespace duet {
@@ -45,6 +46,33 @@ void PersonTrack::add(const HumanJoints& joints, double exposed_at, double recei
   latency_ = received_at - exposed_at;
 }
 
+// Least squares over the pictures of the last `seconds`.
+double PersonTrack::slope(double seconds) const {
+  double n = 0.0, mean_t = 0.0;
+  Eigen::Vector2d mean_p = Eigen::Vector2d::Zero();
+  const auto each = [&](const auto& add) {
+    for (const Kept& kept : kept_)
+      if (kept.at >= newest_at() - seconds) add(kept.at - newest_at(), kept.joints.col(0).head<2>());
+  };
+  each([&](double t, const auto& p) {
+    n += 1.0;
+    mean_t += (t - mean_t) / n;
+    mean_p += (p - mean_p) / n;
+  });
+  double spread = 0.0;
+  Eigen::Vector2d together = Eigen::Vector2d::Zero();
+  each([&](double t, const auto& p) {
+    spread += (t - mean_t) * (t - mean_t);
+    together += (t - mean_t) * (p - mean_p);
+  });
+  return spread > 0.0 ? together.norm() / spread : 0.0;
+}
+
+double PersonTrack::speed() const {
+  constexpr double kLong = 0.4, kShort = 0.12;  // [s]
+  return newest_at() == kNever ? 0.0 : std::max(slope(kLong), slope(kShort) - kShortNoise);
+}
+
 bool PersonTrack::at(double now, HumanJoints& joints, double most_age) const {
   if (!(now - newest_at() <= most_age)) return false;
   const double wanted = now - delay_ - latency_;
@@ -61,6 +89,17 @@ bool PersonTrack::at(double now, HumanJoints& joints, double most_age) const {
   }
   joints = after->joints;
   return true;
+}
+
+void Engagement::update(bool asks, double apart, double speed, double now) {
+  if (!asks) since_ = kNever;
+  if (asks && since_ == kNever) since_ = now;
+  const bool may = asks && apart < kNear && now - since_ <= kLongest;
+  if (!may || speed > (engaged_ ? kHurried : kCalm))
+    calm_since_ = kNever;
+  else if (calm_since_ == kNever)
+    calm_since_ = now;
+  engaged_ = calm_since_ != kNever && (engaged_ || now - calm_since_ >= kCalmTime);
 }
 
 }  // namespace duet

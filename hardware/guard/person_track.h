@@ -62,20 +62,48 @@ class PersonTrack {
   void add(const HumanJoints& joints, double exposed_at, double received_at);
   [[nodiscard]] const HumanJoints& newest() const { return kept_[newest_].joints; }
   [[nodiscard]] double newest_at() const { return kept_[newest_].at; }  // of its picture; kNever: nothing has come
+  // How fast their pelvis moves over the ground [m/s]: the slope of the last 0.4 s, which an estimator's noise hardly
+  // moves, or where it is larger that of the last 0.12 s less kShortNoise, by which somebody who starts is noticed. The
+  // first pictures are taken at their word. 0 for one.
+  [[nodiscard]] double speed() const;
   // At `now` - delay - latency of the newest: linear between two estimates, the newest one beyond it. False where the
   // newest picture is older than `most_age` [s].
   bool at(double now, HumanJoints& joints, double most_age = SafetyRules{}.person.hold) const;
 
  private:
-  static constexpr std::size_t kKept = 8;
+  static constexpr std::size_t kKept = 16;
+  static constexpr double kShortNoise = 0.6;  // twice what 2 cm of noise make of four pictures [m/s]
   struct Kept {
     double at = kNever;
     HumanJoints joints = HumanJoints::Zero();
   };
 
+  [[nodiscard]] double slope(double seconds) const;
+
   double delay_, latency_ = 0.0;
   std::array<Kept, kKept> kept_{};
   std::size_t newest_ = 0;
+};
+
+// Whether a person takes part in the act that a planner asks for: they are near and have been calm for a moment. The
+// touches of the task are allowed only while they do. It is measured: a planner's word is not enough, and lasts no
+// longer than an act.
+class Engagement {
+ public:
+  static constexpr double kNear = 2.5;      // from the robot's root to their pelvis [m]
+  static constexpr double kCalm = 0.8;      // a slow walk [m/s]
+  static constexpr double kHurried = 1.2;   // which ends it [m/s]
+  static constexpr double kCalmTime = 0.3;  // [s]
+  static constexpr double kLongest = 30.0;  // then the planner has to stop asking first [s]
+
+  // Once a tick. `asks`: the planner, about a person whose place is known. `apart` [m], `speed` [m/s], `now` rises [s].
+  void update(bool asks, double apart, double speed, double now);
+  [[nodiscard]] bool engaged() const { return engaged_; }
+
+ private:
+  bool engaged_ = false;
+  double since_ = kNever;  // of the asking [s]; kNever: nobody asks
+  double calm_since_ = kNever;
 };
 
 }  // namespace duet

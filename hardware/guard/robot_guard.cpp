@@ -113,7 +113,6 @@ void RobotGuard::receive(const PersonMessage& message, double now) {
   count_streams();
   note_estimate(taken ? PersonFault::kNone : PersonFault::kOld);
   if (!taken) return;
-  person_speed_ = first ? 0.0 : (message.joints.col(0) - person_.joints.col(0)).norm() / passed;
   person_ = message;
   track_.add(message.joints, exposed_at, now);
   next_.person_at = exposed_at;
@@ -264,10 +263,12 @@ void RobotGuard::command(double now) {
   input_.odometry = level_of(now - next_.odometry_at, setup_.rules.odometry) < StopLevel::kHold;
   const bool person = level_of(now - next_.person_at, setup_.rules.person) < StopLevel::kHold;
   input_.person = person ? &person_.joints : nullptr;
-  input_.person_speed = person_speed_;
+  input_.person_speed = track_.speed();
   const bool holds = safety_.state == SafetyState::kHold;
   const bool planned = safety_.state == SafetyState::kRun || (holds && next_.stands);
-  input_.acting = planned && planner_.acting;
+  const double apart = (person_.joints.col(0) - odometry_.X_WB.p).head<2>().norm();
+  engagement_.update(planned && planner_.acting && person, apart, input_.person_speed, now);
+  input_.acting = engagement_.engaged();
   input_.share = status_.order.share;
   input_.release = planned && status_.contact.release;
   restart_limiter(planned);

@@ -34,7 +34,7 @@ struct GuardSetup {
 struct PlannerMessage {
   std::uint64_t sequence = 0;
   MotionCommand command;
-  bool acting = false;
+  bool acting = false;            // a task with a touch is on; Engagement says when it may touch
   std::optional<Pose> goal = {};  // of the root, in the frame of odometry: what the velocity leads to; for the log
 };
 
@@ -127,7 +127,7 @@ class RobotGuard {
   StreamOrder planner_order_, person_order_;
   PersonMessage person_;
   PersonTrack track_;
-  double person_speed_ = 0.0;
+  Engagement engagement_;
   OdometrySample odometry_;
   BatteryReading battery_;
   double battery_at_ = kNever;

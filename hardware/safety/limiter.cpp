@@ -15,6 +15,8 @@ constexpr double kNearer = 1e-9;
 constexpr double kTorqueRounding = 1e-9;  // of a target that leads by as much as it may [N m]
 // Angle from the open pose at which an arm counts as open [rad].
 constexpr double kOpen = 0.1;
+// Share of the speed of a touch that arms keep however near somebody is who takes part in the act.
+constexpr double kCreep = 0.25;
 
 bool is_finite(const VelocityCommand& root) {
   return std::isfinite(root.forward) && std::isfinite(root.lateral) && std::isfinite(root.yaw_rate) &&
@@ -78,7 +80,9 @@ Limiter::Limiter(const LimiterSetup& setup)
   for (const int joint : setup_.executed.joints) executed_[joint] = true;
   for (const HumanCapsule& capsule : distance_.human().capsules)
     touch_speeds_.push_back(touch_speed(setup_.contact_limits.region(capsule.region), limits.arm_mass));
-  approach_speed_ = std::hypot(limits.forward, limits.lateral) + limits.arm_speed * limits.arm_reach;
+  arm_speed_ = limits.arm_speed * limits.arm_reach;
+  if (!touch_speeds_.empty()) creep_speed_ = kCreep * *std::ranges::min_element(touch_speeds_);
+  approach_speed_ = std::hypot(limits.forward, limits.lateral) + arm_speed_;
   wanted_.q.setZero(setup_.robot->dof());
   q_rest_.setZero(setup_.robot->dof());
   before_.resize(setup_.robot->joints.size());
@@ -147,12 +151,13 @@ void Limiter::choose(const LimiterInput& input, const LimiterState& state, Clamp
   wanted_.q = state.good.q;
   wanted_.share = std::isfinite(input.share) ? std::clamp(input.share, 0.0, 1.0) : 0.0;
   count_if(wanted_.share < 1.0, counts, ClampReason::kHold);
+  wanted_.root_share = wanted_.arm_share = wanted_.share;
 }
 
 void Limiter::open_arms(const LimiterInput& input, ClampCounts& counts) {
   const Eigen::VectorXd& open = setup_.robot->neutral;
   wanted_.q = open;
-  wanted_.share = 1.0;
+  wanted_.share = wanted_.root_share = wanted_.arm_share = 1.0;
   bool arms_are_open = true;
   for (const int joint : setup_.executed.joints)
     arms_are_open = arms_are_open && std::abs(input.state.q[joint] - open[joint]) < kOpen;
@@ -170,22 +175,40 @@ double Limiter::allowed_speed(double distance, double person_speed) const {
 }
 
 // While the act lasts the person is known to want the touch: the parts that may not touch then keep the distance of the
-// speed that is measured, not of the one that is assumed.
+// speed that is measured, not of the one that is assumed. Arms that are too near for that creep: whoever is held in
+// them has to get out.
 void Limiter::keep_distance(const LimiterInput& input, const BodyGaps& gaps, ClampCounts& counts) {
   if (!setup_.person || input.release) return;
   if (input.person == nullptr || !input.odometry) {
-    wanted_.share = 0.0;
+    wanted_.share = wanted_.root_share = wanted_.arm_share = 0.0;
     return count(counts, ClampReason::kPartnerUnknown);
   }
   const double measured = std::max(input.person_speed, 0.0);
   const double assumed = input.acting ? measured : std::max(measured, setup_.limits.human_speed);
-  const double allowed = allowed_speed(gaps.person, assumed) / approach_speed_;
-  count_if(allowed < wanted_.share, counts, ClampReason::kSeparation);
-  wanted_.share = std::min(wanted_.share, allowed);
-  if (gaps.touched < 0 || allowed_speed(gaps.touch, measured) >= approach_speed_) return;
-  const double touch = touch_speeds_[gaps.touched] / approach_speed_;
-  count_if(touch < wanted_.share, counts, ClampReason::kTouchSpeed);
-  wanted_.share = std::min(wanted_.share, touch);
+  double speed = allowed_speed(gaps.person, assumed);
+  count_if(speed < wanted_.share * approach_speed_, counts, ClampReason::kSeparation);
+  if (gaps.touched >= 0 && allowed_speed(gaps.touch, measured) < approach_speed_) {
+    const double touch = touch_speeds_[gaps.touched];
+    count_if(touch < std::min(speed, wanted_.share * approach_speed_), counts, ClampReason::kTouchSpeed);
+    speed = std::min(speed, touch);
+  }
+  share_out(speed);
+  if (input.acting) wanted_.arm_share = std::max(wanted_.arm_share, std::min(input.share, creep_speed_ / arm_speed_));
+}
+
+// A gait has a smallest speed: the root goes as it is asked to, or stands where that is too fast, and the arms have
+// what it leaves. A turn moves the hands, too.
+void Limiter::share_out(double speed) {
+  if (speed >= wanted_.share * approach_speed_) return;
+  const VelocityCommand& root = wanted_.root;
+  const double walk = std::hypot(std::clamp(root.forward, forward_.lower, forward_.upper),
+                                 std::clamp(root.lateral, lateral_.lower, lateral_.upper)) +
+                      std::clamp(std::abs(root.yaw_rate), 0.0, yaw_.upper) * setup_.limits.arm_reach;
+  const double walks = wanted_.share * walk;
+  const bool stands = walks > speed;
+  wanted_.share = speed / approach_speed_;
+  if (stands) wanted_.root_share = 0.0;
+  wanted_.arm_share = std::min(wanted_.arm_share, (stands ? speed : speed - walks) / arm_speed_);
 }
 
 // The root neither leaves the box nor comes nearer to a head: what of the velocity leads there is taken away.
@@ -221,9 +244,9 @@ void Limiter::keep_inside(const LimiterInput& input, const BodyGaps& gaps, Clamp
 
 void Limiter::move_root(LimiterState& state, ClampCounts& counts) const {
   const double dt = setup_.dt;
-  move_speed(wanted_.root.forward, wanted_.share, forward_, dt, state.forward, counts);
-  move_speed(wanted_.root.lateral, wanted_.share, lateral_, dt, state.lateral, counts);
-  move_speed(wanted_.root.yaw_rate, wanted_.share, yaw_, dt, state.yaw, counts);
+  move_speed(wanted_.root.forward, wanted_.root_share, forward_, dt, state.forward, counts);
+  move_speed(wanted_.root.lateral, wanted_.root_share, lateral_, dt, state.lateral, counts);
+  move_speed(wanted_.root.yaw_rate, wanted_.root_share, yaw_, dt, state.yaw, counts);
   AxisClamps clamps;
   AxisBounds height = height_;
   height.rate *= wanted_.share;
@@ -265,7 +288,7 @@ void Limiter::move_joints(const LimiterInput& input, LimiterState& state, ClampC
       continue;
     }
     AxisBounds bounds = joint_bounds_[joint];
-    bounds.rate *= wanted_.share;
+    bounds.rate *= wanted_.arm_share;
     bounds.stop_rate = bounds.rate;
     AxisClamps clamps;
     state.joints[joint] = follow(lead_target(joint, input, counts), before_[joint], bounds, setup_.dt, clamps);

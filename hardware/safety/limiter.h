@@ -156,13 +156,15 @@ class Limiter {
   struct Wanted {
     VelocityCommand root;
     Eigen::VectorXd q;
-    double share = 1.0;
+    double share = 1.0;                        // of all speeds
+    double root_share = 1.0, arm_share = 1.0;  // of it, of those of root and arms
   };
 
   void admit(const MotionCommand* received, LimiterState& state, ClampCounts& counts) const;
   void choose(const LimiterInput& input, const LimiterState& state, ClampCounts& counts);
   void open_arms(const LimiterInput& input, ClampCounts& counts);
   void keep_distance(const LimiterInput& input, const BodyGaps& gaps, ClampCounts& counts);
+  void share_out(double speed);
   void keep_inside(const LimiterInput& input, const BodyGaps& gaps, ClampCounts& counts);
   void move_root(LimiterState& state, ClampCounts& counts) const;
   void move_joints(const LimiterInput& input, LimiterState& state, ClampCounts& counts);
@@ -182,6 +184,8 @@ class Limiter {
   std::vector<bool> executed_;        // of each joint
   std::vector<double> touch_speeds_;  // of each capsule of the person [m/s]
   BodyDistance distance_;
+  double arm_speed_ = 0.0;       // of a hand by its arm [m/s]
+  double creep_speed_ = 0.0;     // that arms keep during an act [m/s]
   double approach_speed_ = 0.0;  // at which a hand and the root may come nearer together [m/s]
   // Values of the tick in work.
   Wanted wanted_;

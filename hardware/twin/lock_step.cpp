@@ -158,6 +158,7 @@ bool TwinInProcess::stop() {
 void TwinInProcess::step_twin() {
   operator_.tick(twin_.time(), twin_);
   twin_.step(kTwinPeriod);
+  if (after_step) after_step();
   LowStateFrame frame;
   if (faulty_.next_state(twin_.time(), frame)) wire_.states.push_back(frame);
 }

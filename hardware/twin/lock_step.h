@@ -87,6 +87,7 @@ class TwinInProcess final : public GuardLink {
   bool next(GuardReport& report) override;
   [[nodiscard]] double patience() const override { return 0.0; }
   [[nodiscard]] std::string name() const override { return "the guard of the twin"; }
+  TwinInProcess* in_process() override { return this; }
 
   // The twin goes on, and nobody ticks the guard.
   void pause(double seconds);
@@ -96,6 +97,7 @@ class TwinInProcess final : public GuardLink {
   [[nodiscard]] TwinModel& twin() { return twin_; }
   [[nodiscard]] TwinOperator& operated() { return operator_; }
   TwinTrouble trouble;
+  std::function<void()> after_step = {};  // of the twin
 
  private:
   // The transport between guard and twin.

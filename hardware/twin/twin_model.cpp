@@ -71,6 +71,14 @@ void TwinModel::obey(const LowCommandFrame& frame) {
   command_ = frame;
 }
 
+void TwinModel::meet(const HumanBody& person) {
+  require(physics_ != nullptr && time_ == 0.0,
+          "twin: expected an engine before its first step for a person who can be "
+          "touched, found {}",
+          physics_ == nullptr ? "none" : "one that has stepped");
+  physics_ = std::make_unique<TwinPhysics>(options_.engine, robot_, kTwinPeriod, person);
+}
+
 void TwinModel::step_joints(double dt) {
   for (int j = 0; j < kG1Motors; ++j) {
     const MotorCommandFrame& motor = command_.motor[j];
@@ -179,19 +187,21 @@ constexpr double kSwayStiffness = 1000.0;   // level: of a frame that keeps it o
 constexpr double kSwayDamping = 200.0;      // [N s/m]
 constexpr double kHookHeight = 0.25;        // over the origin of the trunk, where its eye bolts are [m]
 
-Scene scene_of(const std::shared_ptr<const RobotModel>& robot, double dt) {
+Scene scene_of(const std::shared_ptr<const RobotModel>& robot, double dt, const HumanBody& person) {
   Scene scene;
   scene.robot = robot;
-  scene.partner = PartnerMode::kNone;
+  scene.human = person;
+  scene.partner = person.capsules.empty() ? PartnerMode::kNone : PartnerMode::kSolid;
   scene.dt = dt;
   return scene;
 }
 
 }  // namespace
 
-TwinPhysics::TwinPhysics(const std::string& engine, std::shared_ptr<const RobotModel> robot, double dt)
+TwinPhysics::TwinPhysics(const std::string& engine, std::shared_ptr<const RobotModel> robot, double dt,
+                         const HumanBody& person)
     : robot_(std::move(robot)),
-      backend_(make_backend(engine, scene_of(robot_, dt))),
+      backend_(make_backend(engine, scene_of(robot_, dt, person))),
       kinematics_(*robot_),
       command_(robot_->default_command(robot_->neutral)),
       jacobian_(3, 6 + robot_->dof()),

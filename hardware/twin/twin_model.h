@@ -6,6 +6,7 @@
 
 #include <deque>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "duet/backends/backend.h"
@@ -13,6 +14,7 @@
 #include "duet/core/numbers.h"
 #include "duet/hardware/wire/low_level_frame.h"
 #include "duet/hardware/wire/robot_wire.h"
+#include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/robot_model.h"
 
@@ -23,12 +25,19 @@ namespace duet {
 // the floor otherwise. One owner, one thread.
 class TwinPhysics {
  public:
-  // Standing in the neutral pose at the origin, the rope taut. Throws as make_backend.
-  TwinPhysics(const std::string& engine, std::shared_ptr<const RobotModel> robot, double dt);
+  // Standing in the neutral pose at the origin, the rope taut. `person`: who can be touched; without capsules nobody.
+  // Throws as make_backend.
+  TwinPhysics(const std::string& engine, std::shared_ptr<const RobotModel> robot, double dt,
+              const HumanBody& person = {});
 
   // One step of `dt` under the motors' law kp (q* - q) + kd (dq* - v) + tau; a motor whose mode is not 1 gives nothing.
   // The frame's numbers are finite and its gains not below 0. A twin that has diverged stays where it was.
   void step(const LowCommandFrame& command);
+
+  // Where the person is now and how they go on [m], [m/s]; throws as Backend::set_partner.
+  void move_person(const HumanJoints& joints, const HumanJoints& velocities) {
+    backend_->set_partner(joints, velocities);
+  }
 
   // How much of the rope is in use: 1 holds it where it hung when that was last 0, 0 is slack.
   void hang(double share);
@@ -36,6 +45,7 @@ class TwinPhysics {
 
   [[nodiscard]] const RobotState& state() const { return backend_->state(); }
   [[nodiscard]] const Eigen::VectorXd& torques() const { return backend_->torques(); }
+  [[nodiscard]] std::span<const Contact> contacts() const { return backend_->contacts(); }  // of the last step
   // The reading of an accelerometer in the base [m/s^2], frame B.
   [[nodiscard]] Eigen::Vector3d specific_force() const;
   [[nodiscard]] bool diverged() const { return diverged_; }
@@ -99,6 +109,8 @@ class TwinModel {
   // not obeyed.
   void obey(const LowCommandFrame& frame);
   void obey(const VelocityCommand& velocity) { asked_ = velocity; }
+  // A person who can be touched, before the first step. Throws std::invalid_argument without an engine, and later.
+  void meet(const HumanBody& person);
   // Throws std::invalid_argument for another dt than the engine's.
   void step(double dt);
   void write_state(LowStateFrame& frame);  // with the next tick

@@ -61,6 +61,11 @@ class TwinEpisodes {
       throw InputError(fmt::format("{}: expected a twin's configuration (twin: true)", arguments.config));
     if (!config_.permission.allow_motion)
       throw InputError(fmt::format("{}: it does not allow motion: 'allow_motion' is not true", arguments.config));
+    if (is_solid() && clock_ != TwinClock::kInProcess)
+      throw InputError(
+          fmt::format("a person who can be touched (partner: solid in '{}') needs --clock in-process, found "
+                      "'{}'",
+                      arguments.suite, arguments.clock));
     const ControllerOnBody& body = experiment_.bodies().controller(walker_.name);
     if (!body.refusal.empty()) throw MissingError(body.refusal);
     make_walker_ = Walker::load(walker_.use, walker_.options, body.robot);
@@ -95,6 +100,8 @@ class TwinEpisodes {
     overrides.emplace_back("engines", fmt::format("[{}]", arguments.engine));
     return load_suite(suite_file(arguments.suite), overrides);
   }
+
+  [[nodiscard]] bool is_solid() const { return experiment_.suite().partner == PartnerMode::kSolid; }
 
   void say_first() const {
     note(session_,
@@ -136,6 +143,7 @@ class TwinEpisodes {
     options.camera = camera_;
     options.camera.seed = spec.seed;
     options.policy_sees_clip = sees_clip;
+    options.solid = is_solid();
     const std::string which = sees_clip ? "-clip" : "";
     options.recording = path(index, which + ".npz");
     options.stop_asked = [] { return interrupt() != Interrupt::kNone; };
@@ -192,6 +200,30 @@ class TwinEpisodes {
     return text;
   }
 
+  // How near the robot came to a head, and how hard it was touched where the person is solid.
+  [[nodiscard]] std::string nearness() const {
+    double head = BodyGaps::kFar, most = 0.0, settled = 0.0;
+    long touched = 0, over = 0;
+    for (const GuardedRun& run : runs_) {
+      head = std::min(head, run.head_distance);
+      const auto force = [&](const char* name) {
+        const auto found = run.row.forces.find(name);
+        return found == run.row.forces.end() ? 0.0 : found->second;
+      };
+      most = std::max(most, force("human.peak_n"));
+      settled = std::max(settled, force("human.settled_ratio"));
+      touched += force("human.peak_n") > 0.0 ? 1 : 0;
+      over += force("human.worst_ratio") > 1.0 ? 1 : 0;
+    }
+    std::string text = fmt::format("nearest to a head or neck {:.2f} m", head);
+    if (is_solid())
+      text += fmt::format(
+          "; touched in {} of {} episodes, at most {:.0f} N, over a limit of contact in {} (settled: at "
+          "most {:.2f} of it)",
+          touched, runs_.size(), most, over, settled);
+    return text + "\n";
+  }
+
   [[nodiscard]] std::string clamp_totals() const {
     std::string text;
     for (std::size_t k = 0; k < kClampReasons; ++k) {
@@ -215,11 +247,12 @@ class TwinEpisodes {
     const std::string executed =
         runs_.empty() ? "nothing" : executed_mask_text(runs_.front().executed, *experiment_.bodies().nominal());
     const std::string text = fmt::format(
-        "{}\n{}executed of the reference: {}\nclamps of the guard (its ticks): {}\n{:.1f} s of episodes in {:.1f} s of "
+        "{}\n{}{}executed of the reference: {}\nclamps of the guard (its ticks): {}\n{:.1f} s of episodes in {:.1f} s "
+        "of "
         "wall time with the wait for the guard ({}); held {} of the planner's ticks, {} reports missed, {} ticks left "
         "out of logs",
-        paired_text(success, names().first, names().second), by_task(), executed, clamp_totals(), guard_seconds, wall,
-        arguments_.clock, held, missed, dropped_);
+        paired_text(success, names().first, names().second), by_task(), runs_.empty() ? "" : nearness(), executed,
+        clamp_totals(), guard_seconds, wall, arguments_.clock, held, missed, dropped_);
     nlohmann::json json = paired_json(success);
     json["clock"] = arguments_.clock;
     json["guard_seconds"] = guard_seconds;

@@ -52,6 +52,17 @@ TEST(HwEpisodes, LeaveARunThatReportReads) {
   EXPECT_EQ(read_file(out + "/episodes.jsonl"), rows);
 }
 
+TEST(HwEpisodes, ASolidPersonNeedsTheTwinInThisProcess) {
+  const test::ScratchFolder folder;
+  const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/";
+  const test::Answer answer =
+      test::duet_program("hw episodes " + examples + "twin.yaml " + examples +
+                         "episodes.yaml -s 'controllers=[wbc_sim]' -s partner=solid -o " + (folder / "out"));
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_NE(answer.err.find("needs --clock in-process, found 'lock-step'"), std::string::npos) << answer.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
 TEST(HwEpisodes, AClockThatIsNoneIsRefused) {
   const test::ScratchFolder folder;
   const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/";

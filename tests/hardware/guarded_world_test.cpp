@@ -129,6 +129,50 @@ TEST(GuardedWorld, AGuardThatMindsThePersonHasThemComeNearOnceItRuns) {
   EXPECT_NEAR((last.person->col(0) - last.state.X_WB.p).head<2>().norm(), 0.7, 0.05);
 }
 
+// A hand is laid on the robot's chest: the engine has the contact, in the episode's frame, and the limits hear of it.
+TEST(GuardedWorld, APersonWhoIsSolidTouchesTheTwin) {
+  constexpr int kHand = 22, kWrist = 20;
+  PointTracks partner(100, kSmplJoints);
+  for (int t = 0; t < 100; ++t) {
+    HumanJoints joints = test::standing_adult({1.0, 0.0, 0.95});
+    const double reach = std::max(0.45 - 0.01 * t, 0.14);
+    joints.col(kWrist) = Eigen::Vector3d(reach + 0.1, 0.0, 0.95);
+    joints.col(kHand) = Eigen::Vector3d(reach, 0.0, 0.95);
+    partner.frame(t) = joints;
+  }
+  TwinOptions options;
+  options.engine = "mujoco";
+  GuardedEpisode episode = guarded();
+  episode.solid = SolidPerson{test::adult_body(), load_contact_limits(default_contact_limits_path())};
+  TwinInProcess link(test::twin_guard(), options, std::make_unique<Walker>("wbc_sim", ControllerOptions{}, test::g1()),
+                     nullptr);
+  GuardedWorld world(episode, test::g1(), link);
+  AheadReference source(0.0);
+  const Pose start{yaw_rotation(1.0), {3.0, -2.0, 0.0}};
+  Episode setup = episode_of(1.9, start);
+  for (int t = 0; t < 100; ++t)
+    for (int j = 0; j < kSmplJoints; ++j)
+      partner.frame(t).col(j) = start.p + start.R * Eigen::Vector3d(partner.frame(t).col(j));
+  setup.partner = partner;
+  const Rollout rollout = roll_out(setup, world, source, "twin");
+  ASSERT_TRUE(rollout.safety.has_value());
+  EXPECT_GT(rollout.safety->peak_force, 1.0);
+  ASSERT_FALSE(rollout.recording.contacts.empty());
+  bool hand = false;
+  for (const auto& [tick, contact] : rollout.recording.contacts) {
+    if (contact.side != ContactSide::kHuman) continue;
+    hand = true;
+    EXPECT_LT((contact.p_WC - start.p).head<2>().norm(), 0.4);
+  }
+  EXPECT_TRUE(hand);
+}
+
+TEST(GuardedWorld, APersonWhoIsSolidNeedsATwinWithAnEngine) {
+  GuardedEpisode episode = guarded();
+  episode.solid = SolidPerson{test::adult_body(), load_contact_limits(default_contact_limits_path())};
+  EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { Behind(test::twin_guard(), episode); }));
+}
+
 TEST(GuardedWorld, ARobotThatTiltsIsStoppedAndTheEpisodeSaysSo) {
   Behind behind(test::twin_guard(), guarded(), {parse_twin_fault("tilt@10:60=1.2")});
   const Rollout rollout = behind.roll(8.0);

@@ -41,17 +41,27 @@ TEST(LimiterBesideAPerson, WithinReachOfAPersonsStepItStands) {
   EXPECT_EQ(meeting.counted(ClampReason::kSeparation), 50);
 }
 
-// S = vh (Tr + Ts) + v (Tr + Ts / 2) + Z solved for v, shared by root and arms.
-TEST(LimiterBesideAPerson, BetweenTheTwoTheSpeedIsThatOfTheDistance) {
-  Meeting meeting(1.8);
-  const double speed = meeting.speed_after(150);
-  BodyDistance distance(test::g1(), test::adult_body(), {});
-  const double gap = distance.measure(meeting.input.state.X_WB, meeting.out.q, &meeting.adult, 0.10, false).person;
-  const double allowed = (gap - 1.6 * 0.73 - 0.1) / 0.43;
-  const double all = std::hypot(0.25, 0.15) + 0.5 * 0.6;
-  ASSERT_GT(allowed, 0.0);
-  ASSERT_LT(allowed, all);
-  EXPECT_NEAR(speed, 0.25 * allowed / all, 1e-6);
+// S = vh (Tr + Ts) + v (Tr + Ts / 2) + Z solved for v: what the root's gait needs is the root's, the rest the arms'.
+TEST(LimiterBesideAPerson, ItWalksAsAskedOrStandsAndTheArmsHaveTheRest) {
+  const int elbow = test::g1()->roles.arms[0][3];
+  const auto allowed_at = [](const Meeting& meeting) {
+    BodyDistance distance(test::g1(), test::adult_body(), {});
+    const BodyGaps& gaps = distance.measure(meeting.input.state.X_WB, meeting.out.q, &meeting.adult, 0.10, false);
+    return (gaps.person - 1.6 * 0.73 - 0.1) / 0.43;
+  };
+  Meeting far(1.8), near(1.7);
+  for (Meeting* meeting : {&far, &near}) meeting->command.q[elbow] -= 1.0;
+  EXPECT_NEAR(far.speed_after(60), 0.25, 1e-6);
+  const double left = allowed_at(far) - 0.25;
+  ASSERT_GT(left, 0.01);
+  ASSERT_LT(left, 0.5 * 0.6);
+  const double before = far.out.q[elbow];
+  far.tick();
+  EXPECT_NEAR(std::abs(far.out.q[elbow] - before) / 0.02, left / 0.6, 0.01);
+  EXPECT_EQ(near.speed_after(60), 0.0);
+  ASSERT_GT(allowed_at(near), 0.01);
+  ASSERT_LT(allowed_at(near), 0.25);
+  EXPECT_GT(far.counted(ClampReason::kSeparation), 0);
 }
 
 TEST(LimiterBesideAPerson, AFasterPersonIsKeptFurtherAway) {
@@ -76,12 +86,17 @@ const std::vector<TouchPair> kHug = {{"hand", "hand"},       {"hand", "forearm"}
                                      {"forearm", "forearm"}, {"hand", "chest"},   {"hand", "abdomen"},
                                      {"hand", "thigh"},      {"hand", "pelvis"}};
 
-TEST(LimiterBesideAPerson, DuringTheActItMovesAndTouchIsSlow) {
-  Meeting before(0.8, kHug);
-  EXPECT_EQ(before.speed_after(50), 0.0);
-  Meeting during(0.8, kHug);
+// Somebody who is held in the arms is let out of them; the root does not push on.
+TEST(LimiterBesideAPerson, DuringTheActTheArmsCreepHoweverNearSomebodyIs) {
+  const int elbow = test::g1()->roles.arms[0][3];
+  Meeting before(0.5, kHug), during(0.5, kHug);
   during.input.acting = true;
-  EXPECT_GT(during.speed_after(100), 0.02);
+  for (Meeting* meeting : {&before, &during}) meeting->command.q[elbow] -= 0.4;
+  const double from = during.out.q.size() > 0 ? during.out.q[elbow] : during.input.state.q[elbow];
+  EXPECT_EQ(before.speed_after(100), 0.0);
+  EXPECT_EQ(during.speed_after(100), 0.0);
+  EXPECT_EQ(before.out.q[elbow], from);
+  EXPECT_LT(during.out.q[elbow], from - 0.1);
 }
 
 // Somebody further away reaches out: only their hand is near, and what may not touch leaves most of the speed.

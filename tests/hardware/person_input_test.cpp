@@ -193,6 +193,52 @@ TEST(PersonTrack, BeyondTheNewestItStays) {
   EXPECT_EQ(joints(0, 0), 0.0);  // before the first: the first
 }
 
+// 2 cm of noise are no motion, and somebody who starts to run is seen to within a tenth of a second and the picture.
+TEST(PersonTrack, SpeedIsThatOfThePersonAndNotOfTheNoise) {
+  Random random(7, 3);
+  const auto noise = [&]() -> Eigen::Vector3d {
+    return Eigen::Vector3d(random.normal(), random.normal(), random.normal()) * 0.02;
+  };
+  PersonTrack still, walks, runs;
+  EXPECT_EQ(still.speed(), 0.0);
+  double most = 0.0, sum = 0.0, noticed = 0.0;
+  for (int k = 0; k < 300; ++k) {
+    const double at = k / 30.0;
+    still.add(someone(1, {noise().x(), noise().y(), 3.0}).joints, at, at);
+    walks.add(someone(1, {1.0 * at + noise().x(), noise().y(), 3.0}).joints, at, at);
+    runs.add(someone(1, {4.0 * std::max(at - 5.0, 0.0), 0.0, 3.0}).joints, at, at);
+    if (k >= 12) most = std::max(most, still.speed());
+    if (k >= 12) sum += walks.speed();
+    if (noticed == 0.0 && runs.speed() > Engagement::kHurried) noticed = at - 5.0;
+  }
+  EXPECT_LT(most, Engagement::kCalm);
+  EXPECT_NEAR(sum / 288, 1.0, 0.1);
+  EXPECT_GT(noticed, 0.0);
+  EXPECT_LT(noticed, 0.15);
+}
+
+TEST(Engagement, IsMeasuredAndNotThePlannersWord) {
+  Engagement engagement;
+  double now = 0.0;
+  const auto after = [&](double seconds, bool asks, double apart, double speed) {
+    for (double left = seconds; left > 1e-9; left -= 0.01) engagement.update(asks, apart, speed, now += 0.01);
+    return engagement.engaged();
+  };
+  EXPECT_FALSE(after(1.0, false, 1.0, 0.0)) << "nobody asks";
+  EXPECT_FALSE(after(0.2, true, 1.0, 0.0));
+  EXPECT_TRUE(after(0.2, true, 1.0, 0.0));
+  EXPECT_TRUE(after(1.0, true, 1.0, 1.0)) << "who is calm may step";
+  EXPECT_FALSE(after(0.02, true, 1.0, 1.3));
+  EXPECT_FALSE(after(1.0, true, 1.0, 1.0)) << "has to be calm again first";
+  EXPECT_TRUE(after(0.5, true, 1.0, 0.5));
+  EXPECT_FALSE(after(0.02, true, 2.6, 0.0)) << "too far away to be meant";
+  EXPECT_TRUE(after(0.5, true, 2.4, 0.0));
+  EXPECT_FALSE(after(30.0, true, 1.0, 0.0)) << "no act is so long";
+  EXPECT_FALSE(after(5.0, true, 1.0, 0.0));
+  after(0.02, false, 1.0, 0.0);
+  EXPECT_TRUE(after(0.5, true, 1.0, 0.0));
+}
+
 // Over the socket to the guard: the person is known, stands still to it, and is lost in a quarter of a second.
 TEST(PersonInput, TheGuardHearsOfThePersonAndLosesThem) {
   const test::ScratchFolder folder;
