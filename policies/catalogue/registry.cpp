@@ -44,12 +44,23 @@ constexpr PolicyRole kKnowsTheMotion = {ArmRole::kOracle, "knows the motion"};
 constexpr PolicyRole kStandsStill = {ArmRole::kControl, "stands still"};
 constexpr PolicyRole kScripted = {ArmRole::kControl, "scripted"};
 
+struct ControlOptions {
+  bool average = false;
+};
+
+const FieldTable<ControlOptions>& control_options() {
+  static const FieldTable<ControlOptions> table = {field<ControlOptions>(
+      {.name = "average", .meaning = "takes the partner where the last 0.24 s have them on average: a noisy one, too"},
+      &ControlOptions::average)};
+  return table;
+}
+
 PolicyInfo control_info(const std::string& name) {
   const auto found = std::ranges::find(control_scripts(), name, &ControlScript::name);
-  return {name, std::string(found->about), {}};
+  return {name, std::string(found->about), option_list<PolicyOption>(control_options())};
 }
-PolicyMaker named_control(const std::string& name, Robot robot, const PolicyOptions&) {
-  return control_maker(name, std::move(robot));
+PolicyMaker named_control(const std::string& name, Robot robot, const PolicyOptions& options) {
+  return control_maker(name, std::move(robot), read_options("policy", name, control_options(), options).average);
 }
 
 constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_files, kKnowsTheMotion},

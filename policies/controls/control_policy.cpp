@@ -112,9 +112,10 @@ std::vector<std::string> control_names() {
   return names;
 }
 
-PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot) {
+PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot, bool averages) {
   require(robot != nullptr, "policy '{}' needs a robot", name);
-  const ControlScript script = control_named(name);
+  ControlScript script = control_named(name);
+  script.averages = averages;
   static_cast<void>(ControlPolicy(robot, script));  // a robot that does not fit is found here
   return [robot = std::move(robot), script] { return std::make_unique<ControlPolicy>(robot, script); };
 }
@@ -163,7 +164,12 @@ Anchors ControlPolicy::act(const Observation& observation) {
 }
 
 std::vector<Reference> ControlPolicy::plan(const Observation& observation) {
-  const ObservationFrame& frame = observation.now();
+  ObservationFrame frame = observation.now();
+  if (script_.averages) {
+    frame.partner.setZero();
+    for (const ObservationFrame& seen : observation.history)
+      frame.partner += seen.partner / static_cast<double>(observation.history.size());
+  }
   const Place where = place(frame);
   partner_.look(frame);
   if (!awake_) watch(frame, observation.tick);

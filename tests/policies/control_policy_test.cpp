@@ -3,13 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "duet/core/numbers.h"
 #include "duet/core/task.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/policies/language.h"
 #include "duet/robots/roles.h"
 #include "tests/policies/fixtures.h"
@@ -170,6 +174,30 @@ TEST(ControlPolicy, AWaitingOneBeginsWithItsPartner) {
   const double hanging = kiss.hand_height(low, 0);
   (void)kiss.hand_height(high, 10);
   EXPECT_NEAR(kiss.hand_height(low, 10 + 200 + 40), hanging, 1e-9);
+}
+
+// 6 cm of noise on a partner who hangs their arms wake it; on the mean of a quarter of a second they do not.
+TEST(ControlPolicy, OneThatAveragesIsNotWokenByNoise) {
+  const auto robot = g1();
+  const auto wakes = [&](const char* average) {
+    const std::unique_ptr<Policy> policy = make_policy("waiting", robot, {{"average", average}});
+    const ObservationFrame low = facing(*robot, 2.0, {1.9, 0.2, 0.8});
+    policy->reset({.task = Task::kWave, .prompt = "", .start = low.robot});
+    Random random(3, 5);
+    std::vector<ObservationFrame> history(kHistoryFrames, low);
+    double highest = 0.0;
+    for (int tick = 0; tick < 500; tick += 10) {
+      for (ObservationFrame& frame : history) {
+        frame = low;
+        for (Eigen::Index k = 0; k < frame.partner.size(); ++k) frame.partner.data()[k] += 0.06 * random.normal();
+      }
+      for (const Reference& reference : policy->plan({history, tick}))
+        highest = std::max(highest, hand_of(*robot, reference, "rhand").z());
+    }
+    return highest > 1.0;
+  };
+  EXPECT_TRUE(wakes("false"));
+  EXPECT_FALSE(wakes("true"));
 }
 
 TEST(ControlPolicy, AWaitingOneBowsToABow) {
