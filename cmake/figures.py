@@ -335,6 +335,22 @@ def arena(folder, engine, actuation):
     return markdown(["Controller", "Body", "Reached", "Fails first at", *titles], [False] * 4 + [True] * len(rungs), table)
 
 
+def arena_engines(actuation, *folders):
+    """The rung that each network reaches in each engine, and its mean over the rungs; of the networks that ran in all of them."""
+    rows = [r for folder in folders for r in rows_of(folder, "arena.csv") if (r["source"], r["perturbation"], r["of"]) == ("duet", actuation, "rung")]
+    engines = [e for e in ("mujoco", "bullet", "ode", "simbody", "dart") if any(r["engine"] == e for r in rows)]
+    table = []
+    for controller in sorted(dict.fromkeys(r["controller"] for r in rows)):
+        of = {(r["engine"], r["name"]): r for r in rows if r["controller"] == controller}
+        if any((engine, "mean") not in of for engine in engines):
+            continue
+        reached = [float(of[e, "reached"]["value"]) if (e, "reached") in of else 0.0 for e in engines]
+        means = [float(of[e, "mean"]["value"]) for e in engines]
+        cells = [f"{f'{r:.0f}' if r else 'none'}, {short(m)}" for r, m in zip(reached, means)]
+        table.append((-sum(reached), -sum(means), [f"`{controller}`", *cells, f"{100 * (max(means) - min(means)):.1f}"]))
+    return markdown(["Controller", *engines, "largest difference"], [False] + [True] * (len(engines) + 1), [line for _, _, line in sorted(table)])
+
+
 def arena_order(*boards):
     """The networks that a public benchmark ran, too, in its order, beside the boards (FOLDER:ACTUATION, of MuJoCo): the rung reached and the mean over rungs;
     last, how far the orders agree."""
@@ -374,6 +390,27 @@ def jitter(folder):
     return markdown(["Policy", "Controller", *pairs, *errors], [False, False] + [True] * 5, table)
 
 
+def perception(folder):
+    """Table S9: success by the rule of each policy, its difference to clean over the same episodes; what the printed detectors say; and the supplement's."""
+    rows = rows_of(folder, "degradation.csv")
+    ours = [r for r in rows if r["source"] == "duet" and r["policy"] != "replay"]
+    sizes = {(r["perturbation"]): (r["of"], float(r["value"])) for r in ours if r["name"] == "size"}
+    theirs = {(r["of"], float(r["value"])): r["perturbation"] for r in rows if r["source"] == "paper" and r["name"] == "size"}
+    printed = {r["perturbation"]: percent(r["value"]) for r in rows if r["source"] == "paper" and r["name"] == "success"}
+    policies, table = list(dict.fromkeys(r["policy"] for r in ours)), []
+    for perturbation in dict.fromkeys(r["perturbation"] for r in ours if r["perturbation"]):
+        of = {(r["policy"], r["name"]): r for r in ours if r["perturbation"] == perturbation}
+        cells = []
+        for policy in policies:
+            against = of.get((policy, "against_clean"))
+            less = f" ({100 * float(against['value']):+.1f} [{percent(against['low'])}, {percent(against['high'])}])" if against else ""
+            cells.append(percent(of[policy, "success"]["value"]) + less)
+        known = printed.get(theirs.get(sizes.get(perturbation), perturbation), "-")
+        table.append([f"`{perturbation}`", *cells, percent(of["dstar", "paper_success"]["value"]), known])
+    return markdown(["seen with", *[f"`{policy}`" for policy in policies], "`dstar`, printed detectors", "the supplement's D-STAR"],
+                    [False] + [True] * (len(policies) + 2), table)
+
+
 def suites(program):
     """The suites that ship, what each asks, and whether its rows are published."""
     found = json.loads(output([program, "list", "suites", "--json"]))
@@ -405,15 +442,17 @@ def contents(source, program):
         return (own_worlds if words[0] == "own_worlds" else own_worlds_paired)(*words[1:])
     if words[:1] == ["arena"] and len(words) == 4:
         return arena(*words[1:])
+    if words[:1] == ["arena_engines"] and len(words) > 2:
+        return arena_engines(*words[1:])
     if words[:1] == ["arena_order"] and len(words) > 1:
         return arena_order(*words[1:])
     if words[:1] == ["people"] and len(words) == 3:
         return people(*words[1:])
     tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
-              "actuation": actuation, "jitter": jitter}
+              "actuation": actuation, "jitter": jitter, "perception": perception}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER ENGINE ACTUATION, arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, jitter FOLDER, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):

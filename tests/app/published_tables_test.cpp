@@ -77,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables,
 
 // The others of its tables are long, and nothing is quoted from them.
 TEST(PublishedArena, ItsBoardsAreWhatTheRowsSay) {
-  for (const std::string run : {"arena", "arena_arms"}) {
+  for (const std::string run : {"arena", "arena_arms", "arena_engines"}) {
     const Analysis board = arena_analysis(load_run(in("published/" + run)).rows);
     EXPECT_EQ(lines_of(read_file(in("tables/" + run + "/arena.csv"))), lines_of(analysis_csv(board))) << run;
   }
