@@ -75,6 +75,13 @@ INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables,
                                          "jitter"),
                          [](const auto& info) { return std::string(info.param); });
 
+TEST(PublishedPerception, ItsTableIsWhatTheRowsSay) {
+  duet::Run run = load_run(in("published/perception"));
+  add_missing_tags(run);
+  EXPECT_EQ(lines_of(read_file(in("tables/perception/degradation.csv"))),
+            lines_of(analysis_csv(degradation_analysis(run.rows))));
+}
+
 // The others of its tables are long, and nothing is quoted from them.
 TEST(PublishedArena, ItsBoardsAreWhatTheRowsSay) {
   for (const std::string run : {"arena", "arena_arms", "arena_engines"}) {
