@@ -10,11 +10,13 @@ namespace {
 
 constexpr int kMostWriters = 64;
 
+// Nothing but the interface: whether peers find each other by multicast is left to the library, which looks whether the
+// interface has it, as it does for the maker's programs. Whoever decides otherwise is not found by them.
 std::string configuration(const DdsPlace& place) {
   return fmt::format(
-      "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"{}\"{}/></Interfaces></General>"
+      "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"{}\"/></Interfaces></General>"
       "</Domain></CycloneDDS>",
-      place.interface, place.interface == "lo" ? " multicast=\"false\"" : "");
+      place.interface);
 }
 
 }  // namespace

@@ -18,12 +18,16 @@ using CommandSample = unitree_hg_msg_dds__LowCmd_;
 using StateSample = unitree_hg_msg_dds__LowState_;
 using OdometryMessage = unitree_go_msg_dds__SportModeState_;
 using BatteryMessage = unitree_hg_msg_dds__BmsState_;
+using RemoteMessage = unitree_go_msg_dds__WirelessController_;
 static_assert(sizeof(CommandSample) == sizeof(LowCommandFrame) && sizeof(StateSample) == sizeof(LowStateFrame));
+static_assert(sizeof(unitree_hg_msg_dds__IMUState_) == sizeof(ImuFrame));
 
 constexpr const char* kCommandTopic = "rt/lowcmd";
 constexpr const char* kStateTopic = "rt/lowstate";
 constexpr const char* kOdometryTopic = "rt/odommodestate";
 constexpr const char* kBatteryTopic = "rt/lf/bmsstate";
+constexpr const char* kRemoteTopic = "rt/wirelesscontroller";
+constexpr const char* kTrunkImuTopic = "rt/secondary_imu";
 
 class DdsRobotWire final : public RobotWire {
  public:
@@ -88,6 +92,8 @@ class DdsTwinWire final : public TwinWire {
         states_(participant_.writer(unitree_hg_msg_dds__LowState__desc, kStateTopic)),
         odometry_(participant_.writer(unitree_go_msg_dds__SportModeState__desc, kOdometryTopic)),
         battery_(participant_.writer(unitree_hg_msg_dds__BmsState__desc, kBatteryTopic)),
+        remote_(participant_.writer(unitree_go_msg_dds__WirelessController__desc, kRemoteTopic)),
+        trunk_imu_(participant_.writer(unitree_hg_msg_dds__IMUState__desc, kTrunkImuTopic)),
         others_(participant_) {}
 
   bool take(LowCommandFrame& frame) override {
@@ -112,12 +118,19 @@ class DdsTwinWire final : public TwinWire {
     message.soc = static_cast<std::uint8_t>(reading.charge > 0.0 ? std::min(reading.charge, 100.0) : 0.0);
     (void)dds_write(battery_, &message);
   }
+  void write(const RemoteControl& remote) override {
+    if (!remote.heard) return;
+    const RemoteMessage message{
+        .lx = remote.lx, .ly = remote.ly, .rx = remote.rx, .ry = remote.ry, .keys = remote.keys};
+    (void)dds_write(remote_, &message);
+  }
+  void write(const ImuFrame& imu) override { (void)dds_write(trunk_imu_, &imu); }
   int command_writers() override { return others_.of(kCommandTopic); }
   bool wait(double most) override { return commands_wait_.wait(commands_, most); }
 
  private:
   Participant participant_;
-  dds_entity_t commands_, states_, odometry_, battery_;
+  dds_entity_t commands_, states_, odometry_, battery_, remote_, trunk_imu_;
   WriterCount others_;
   DataWait commands_wait_{participant_.entity()};
 };
@@ -138,7 +151,8 @@ std::string dds_type_digest(const std::string& type) {
        {&unitree_hg_msg_dds__MotorCmd__desc, &unitree_hg_msg_dds__LowCmd__desc, &unitree_hg_msg_dds__IMUState__desc,
         &unitree_hg_msg_dds__MotorState__desc, &unitree_hg_msg_dds__LowState__desc, &unitree_go_msg_dds__IMUState__desc,
         &unitree_go_msg_dds__PathPoint__desc, &unitree_go_msg_dds__TimeSpec__desc,
-        &unitree_go_msg_dds__SportModeState__desc, &unitree_hg_msg_dds__BmsState__desc,
+        &unitree_go_msg_dds__SportModeState__desc, &unitree_go_msg_dds__WirelessController__desc,
+        &unitree_hg_msg_dds__BmsState__desc,
         &unitree_api_msg_dds__Request__desc, &unitree_api_msg_dds__Response__desc}) {
     if (type != known->m_typename) continue;
     Sha256 digest;
@@ -156,9 +170,11 @@ using RequestSample = unitree_api_msg_dds__Request_;
 using ResponseSample = unitree_api_msg_dds__Response_;
 
 constexpr const char* kArmTopic = "rt/arm_sdk";
-constexpr const char* kRequestTopic = "rt/api/sport/request";
-constexpr const char* kResponseTopic = "rt/api/sport/response";
 constexpr int kCallsKept = 32;  // a call that is overwritten is lost
+
+std::string topic_of(Service service, const char* end) {
+  return fmt::format("rt/api/{}/{}", kServiceNames[static_cast<std::size_t>(service)], end);
+}
 
 // The oldest sample lent by DDS; null where there is none. It is given back by the destructor.
 template <typename Sample>
@@ -185,8 +201,10 @@ class DdsSportWire final : public SportWire {
  public:
   explicit DdsSportWire(const DdsPlace& place)
       : participant_(place),
-        responses_(participant_.reader(unitree_api_msg_dds__Response__desc, kResponseTopic, kCallsKept)),
-        requests_(participant_.writer(unitree_api_msg_dds__Request__desc, kRequestTopic, kCallsKept)),
+        responses_(participant_.reader(unitree_api_msg_dds__Response__desc,
+                                       topic_of(Service::kSport, "response").c_str(), kCallsKept)),
+        requests_(participant_.writer(unitree_api_msg_dds__Request__desc, topic_of(Service::kSport, "request").c_str(),
+                                      kCallsKept)),
         others_(participant_) {}
 
   bool take(RpcResponse& response) override {
@@ -226,31 +244,37 @@ class DdsSportWire final : public SportWire {
   std::array<char, 96> parameter_{};
 };
 
-class DdsSportService final : public SportServiceWire {
+class DdsServices final : public ServicesWire {
  public:
-  explicit DdsSportService(const DdsPlace& place)
-      : participant_(place),
-        arms_(participant_.reader(unitree_hg_msg_dds__LowCmd__desc, kArmTopic)),
-        requests_(participant_.reader(unitree_api_msg_dds__Request__desc, kRequestTopic, kCallsKept)),
-        responses_(participant_.writer(unitree_api_msg_dds__Response__desc, kResponseTopic, kCallsKept)) {}
+  DdsServices(const DdsPlace& place, std::span<const Service> services)
+      : participant_(place), arms_(participant_.reader(unitree_hg_msg_dds__LowCmd__desc, kArmTopic)) {
+    for (const Service service : services) {
+      Calls& calls = of(service);
+      calls.requests = participant_.reader(unitree_api_msg_dds__Request__desc, topic_of(service, "request").c_str(),
+                                           kCallsKept);
+      calls.responses = participant_.writer(unitree_api_msg_dds__Response__desc, topic_of(service, "response").c_str(),
+                                            kCallsKept);
+    }
+  }
 
-  bool take(RpcRequest& request) override {
-    const Loan<RequestSample> loan(requests_);
+  bool take(Service service, RpcRequest& request) override {
+    if (of(service).requests == 0) return false;
+    const Loan<RequestSample> loan(of(service).requests);
     const RequestSample* sample = loan.get();
     if (sample == nullptr) return false;
-    request = read_request(sample->header.identity.id, static_cast<SportCall>(sample->header.identity.api_id));
+    request = read_request(sample->header.identity.id, static_cast<ServiceCall>(sample->header.identity.api_id));
     const std::size_t length = sample->parameter == nullptr ? 0 : std::strlen(sample->parameter);
     std::copy_n(sample->parameter, std::min(length, request.parameter.size() - 1), request.parameter.begin());
     return true;
   }
-  void respond(const RpcResponse& response) override {
+  void respond(Service service, const RpcResponse& response) override {
     ResponseSample sample{};
     sample.header.identity.id = response.id;
     sample.header.identity.api_id = response.api;
     sample.header.status.code = response.code;
     text_ = response.data;
     sample.data = text_.data();
-    (void)dds_write(responses_, &sample);
+    (void)dds_write(of(service).responses, &sample);
   }
   bool take_arms(LowCommandFrame& frame) override {
     ArmSample sample;
@@ -260,8 +284,14 @@ class DdsSportService final : public SportServiceWire {
   }
 
  private:
+  struct Calls {
+    dds_entity_t requests = 0, responses = 0;
+  };
+  Calls& of(Service service) { return calls_[static_cast<std::size_t>(service)]; }
+
   Participant participant_;
-  dds_entity_t arms_, requests_, responses_;
+  dds_entity_t arms_;
+  std::array<Calls, kServiceNames.size()> calls_{};
   std::string text_;
 };
 
@@ -269,9 +299,9 @@ class DdsSportService final : public SportServiceWire {
 
 std::unique_ptr<SportWire> open_sport_wire(const DdsPlace& place) { return std::make_unique<DdsSportWire>(place); }
 
-std::unique_ptr<SportServiceWire> open_sport_service(const DdsPlace& place) {
+std::unique_ptr<ServicesWire> open_services(const DdsPlace& place, std::span<const Service> services) {
   check_twin_place(place);
-  return std::make_unique<DdsSportService>(place);
+  return std::make_unique<DdsServices>(place, services);
 }
 
 }  // namespace duet

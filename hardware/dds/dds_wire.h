@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 
 #include "duet/hardware/executors/sport_executor.h"
@@ -30,13 +31,14 @@ std::string dds_type_digest(const std::string& type);
 std::unique_ptr<SportWire> open_sport_wire(const DdsPlace& place);
 
 // The other side, in a twin's domain.
-class SportServiceWire {
+class ServicesWire {
  public:
-  virtual ~SportServiceWire() = default;
-  virtual bool take(RpcRequest& request) = 0;
-  virtual void respond(const RpcResponse& response) = 0;
+  virtual ~ServicesWire() = default;
+  // The next call of that service; false where there is none, or the service is not one of those that were opened.
+  virtual bool take(Service service, RpcRequest& request) = 0;
+  virtual void respond(Service service, const RpcResponse& response) = 0;
   virtual bool take_arms(LowCommandFrame& frame) = 0;
 };
-std::unique_ptr<SportServiceWire> open_sport_service(const DdsPlace& place);
+std::unique_ptr<ServicesWire> open_services(const DdsPlace& place, std::span<const Service> services);
 
 }  // namespace duet

@@ -1,6 +1,6 @@
 // duet-g1-services: stand-ins for the programs on a robot that the executors speak to, beside `duet-g1-twin` in a
-// domain that no robot has: HOMIE's two processes, or the maker's walking. They command the twin. docs/hardware.md,
-// "Executors".
+// domain that no robot has: HOMIE's two processes, or the maker's walking. They command the twin. Beside either, and
+// alone, the maker's motion_switcher. docs/hardware.md, "Executors".
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -22,6 +22,8 @@ using namespace duet;  // a program of its own
 
 constexpr int kPeriodUs = 5000;  // of its commands, as HOMIE's controller has it
 constexpr int kPolicyEvery = 4;  // of these periods, as its policy has it
+constexpr const char* kMakersMode = "ai";  // in which a G1 walks
+constexpr Service kSwitched[] = {Service::kMotionSwitcher};
 volatile std::sig_atomic_t services_stopped = 0;
 
 struct ServicesArguments {
@@ -29,7 +31,7 @@ struct ServicesArguments {
   LcmPlace lcm;
   std::uint16_t velocity_port = 0;
   double seconds = 0.0;
-  bool homie = false, sport = false, echo = false;
+  bool homie = false, sport = false, switcher = false, echo = false;
   int fsm = kFsmStart;
 };
 
@@ -44,14 +46,21 @@ class TwinMotors {
     LowStateFrame state;
     bool came = false;
     while (wire_->take(state)) came = read_state(state, reading_) == FrameFault::kNone || came;
-    if (came) wire_->open_writer();
     return came;
   }
   void write(const LowCommandFrame& frame, const VelocityCommand& velocity) {
+    wire_->open_writer();
     (void)wire_->write(frame);
     LcmBuffer buffer;
     const PedalCommand pedal{{velocity.forward, velocity.lateral, velocity.yaw_rate, velocity.height}};
     (void)velocity_.send(std::span<const std::byte>(buffer).first(encode(pedal, sequence_++, buffer)));
+  }
+  // Leaves the motors limp, and the topic to somebody else.
+  void release() {
+    LowCommandFrame limp;
+    build_damping(0.0, machine(), limp);
+    if (wire_->has_writer()) (void)wire_->write(limp);
+    wire_->close_writer();
   }
   [[nodiscard]] const RobotReading& reading() const { return reading_; }
   [[nodiscard]] std::uint8_t machine() const { return reading_.mode_machine; }
@@ -76,13 +85,28 @@ void every_period(const ServicesArguments& arguments, const Step& step) {
   }
 }
 
+void answer_switcher(ServicesWire& wire, FakeSwitcher& switcher) {
+  RpcRequest request;
+  while (wire.take(Service::kMotionSwitcher, request))
+    wire.respond(Service::kMotionSwitcher, switcher.answer(request));
+}
+
+void play_switcher(const ServicesArguments& arguments) {
+  const std::unique_ptr<ServicesWire> wire = open_services(arguments.place, kSwitched);
+  FakeSwitcher switcher;
+  every_period(arguments, [&](double) { answer_switcher(*wire, switcher); });
+}
+
 void play_homie(const ServicesArguments& arguments) {
   TwinMotors motors(arguments);
+  const std::unique_ptr<ServicesWire> wire = open_services(arguments.place, kSwitched);
+  FakeSwitcher switcher;
   LcmChannel channel(arguments.lcm);
   FakeHomie homie;
   std::uint32_t sequence = 0;
   long periods = 0;
   every_period(arguments, [&](double now) {
+    answer_switcher(*wire, switcher);
     LcmBuffer buffer;
     bool own = false;
     if (periods++ % kPolicyEvery == 0)
@@ -104,16 +128,21 @@ void play_homie(const ServicesArguments& arguments) {
 
 void play_sport(const ServicesArguments& arguments) {
   TwinMotors motors(arguments);
-  const std::unique_ptr<SportServiceWire> wire = open_sport_service(arguments.place);
+  constexpr Service kServed[] = {Service::kSport, Service::kMotionSwitcher};
+  const std::unique_ptr<ServicesWire> wire = open_services(arguments.place, kServed);
+  FakeSwitcher switcher(kMakersMode);
   const std::shared_ptr<const RobotModel> robot = load_shared_robot();
   FakeSport service(robot->default_command(robot->neutral), arguments.fsm);
   long calls = 0;
   every_period(arguments, [&](double now) {
+    answer_switcher(*wire, switcher);
     RpcRequest request;
-    for (; wire->take(request); ++calls) wire->respond(service.answer(request, now));
+    for (; wire->take(Service::kSport, request); ++calls)
+      if (switcher.runs()) wire->respond(Service::kSport, service.answer(request, now));
     LowCommandFrame frame;
     while (wire->take_arms(frame)) service.obey_arms(frame);
     if (!motors.listen()) return;
+    if (!switcher.runs()) return motors.release();
     service.write_command(motors.machine(), frame);
     motors.write(frame, service.velocity(now));
   });
@@ -142,7 +171,7 @@ void play_echo(const ServicesArguments& arguments) {
 int main(int argc, char** argv) {
   ServicesArguments arguments;
   CLI::App app("Stand-ins for the programs on a G1 that `duet hw` commands, beside a twin. They have no gait.");
-  app.add_option("--domain", arguments.place.domain, "of DDS, 100 to 199")->required();
+  app.add_option("--domain", arguments.place.domain, "of DDS, 100 to 199, or 1")->required();
   app.add_option("--velocity-port", arguments.velocity_port, "UDP port of 127.0.0.1 where the twin takes velocities");
   app.add_option("--lcm-port", arguments.lcm.port, "of the multicast group of LCM");
   app.add_option("--fsm", arguments.fsm, "state of the maker's machine at first");
@@ -150,6 +179,8 @@ int main(int argc, char** argv) {
   CLI::Option_group* what = app.add_option_group("what");
   what->add_flag("--homie", arguments.homie, "HOMIE's processes, over LCM on lo");
   what->add_flag("--sport", arguments.sport, "the maker's walking and its arm topic");
+  what->add_flag("--switcher", arguments.switcher,
+                 "the maker's motion_switcher alone, which says that no mode runs: a robot in debug mode");
   what->add_flag("--echo", arguments.echo, "answers every command with a state");
   what->require_option(1);
   CLI11_PARSE(app, argc, argv);
@@ -160,6 +191,7 @@ int main(int argc, char** argv) {
     (void)ask_for_real_time();
     if (arguments.homie) play_homie(arguments);
     if (arguments.sport) play_sport(arguments);
+    if (arguments.switcher) play_switcher(arguments);
     if (arguments.echo) play_echo(arguments);
     return 0;
   } catch (const std::exception& error) {

@@ -20,8 +20,7 @@ namespace {
 
 using namespace duet;  // a program of its own
 
-constexpr int kWritersEvery = 50;  // ticks
-constexpr double kPressed = 0.1;   // [s]
+constexpr int kWritersEvery = 50, kRemoteEvery = 5;  // ticks
 volatile std::sig_atomic_t stopped = 0;
 
 struct TwinArguments {
@@ -30,18 +29,8 @@ struct TwinArguments {
   std::vector<std::string> faults;
   double seconds = 0.0;
   std::uint16_t velocity_port = 0;
-  bool operated = false, presses = false, lock_step = false;
+  bool operated = false, lock_step = false;
 };
-
-// The same by the clock alone, for programs that command the motors before anybody has armed: R1 held, start and A in
-// turn.
-void press_in_turn(double time, TwinModel& twin) {
-  const auto bit = [](RemoteKey key) { return static_cast<std::uint16_t>(1u << static_cast<int>(key)); };
-  const double second = std::floor(time);
-  const bool pressed = time - second < kPressed;
-  const RemoteKey key = static_cast<long>(second) % 2 == 0 ? RemoteKey::kStart : RemoteKey::kA;
-  twin.remote.keys = static_cast<std::uint16_t>(bit(RemoteKey::kR1) | (pressed ? bit(key) : 0));
-}
 
 void take_velocity(DatagramSocket& socket, TwinModel& twin) {
   LcmBuffer buffer;
@@ -101,12 +90,14 @@ class WiredTwin {
     while (wire_->take(command_)) twin_.obey(command_);
     take_velocity(velocity_, twin_);
     if (arguments_.operated) operator_.tick(time, twin_);
-    if (arguments_.presses) press_in_turn(time, twin_);
     twin_.step(kTwinPeriod);
     wire_->write(twin_.odometry(time));
     const bool leaves = faulty_.next_state(time, state_);
     if (leaves) wire_->write(state_);
     totals_.states += leaves ? 1 : 0;
+    twin_.write_trunk_imu(trunk_imu_);
+    wire_->write(trunk_imu_);
+    if (tick % kRemoteEvery == 0) wire_->write(twin_.remote);
     if (tick % kWritersEvery == 0) {
       totals_.most_writers = std::max(totals_.most_writers, wire_->command_writers());
       wire_->write(BatteryReading{.charge = twin_.condition.charge});
@@ -124,11 +115,12 @@ class WiredTwin {
   TwinTotals totals_;
   LowCommandFrame command_{};
   LowStateFrame state_{};
+  ImuFrame trunk_imu_{};
 };
 
 void add_options(CLI::App& app, TwinArguments& arguments) {
   TwinOptions& options = arguments.options;
-  app.add_option("--domain", arguments.place.domain, "of DDS, 100 to 199")->required();
+  app.add_option("--domain", arguments.place.domain, "of DDS, 100 to 199, or 1")->required();
   app.add_option("--seconds", arguments.seconds, "for which it runs; 0: until it is stopped");
   app.add_option("--seed", options.seed, "of its noise");
   app.add_option("--physics", options.engine, "engine that simulates its body (mujoco, ...); without: first-order");
@@ -149,7 +141,6 @@ void add_options(CLI::App& app, TwinArguments& arguments) {
       ->allow_extra_args(false);
   app.add_flag("--operated", arguments.operated,
                "an operator holds the dead-man switch, stands it up, lets it down and runs it");
-  app.add_flag("--presses", arguments.presses, "an operator holds the dead-man switch and presses start and A in turn");
 }
 
 }  // namespace

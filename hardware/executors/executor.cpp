@@ -117,8 +117,10 @@ std::string permission_refusal(const ArmingFacts& facts) {
   if (permission.interface.empty() || permission.interface == "auto")
     return fmt::format("the configuration has to name a network interface, found '{}'", permission.interface);
   if (permission.domain < 0) return "the configuration names no domain of DDS";
-  if (facts.twin != (permission.domain >= 100 && permission.domain < 200))
-    return fmt::format("domain {}: a twin has 100 to 199, and a robot has none of these", permission.domain);
+  const bool of_twins = permission.domain >= kFirstTwinDomain || is_twin_place({permission.domain, permission.interface});
+  if (facts.twin != of_twins)
+    return fmt::format("domain {}: a twin has 100 to 199, or 1 on 'lo', and a robot has none of these",
+                       permission.domain);
   if (permission.mode_machine != facts.reported_mode_machine)
     return fmt::format("mode_machine: expected {} as configured, the robot reports {}", permission.mode_machine,
                        facts.reported_mode_machine);

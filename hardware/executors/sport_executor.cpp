@@ -37,7 +37,7 @@ void SportExecutor::poll(double now) {
   for (int k = 0; k < kMostResponses && wire_.take(response); ++k) hear(response, now);
   if (now - asked_at_ < kAskPeriod) return;
   asked_at_ = now;
-  wire_.request(read_request(next_id_++, SportCall::kGetFsm));
+  wire_.request(read_request(next_id_++, ServiceCall::kGetFsm));
 }
 
 void SportExecutor::hear(const RpcResponse& response, double now) {
@@ -45,7 +45,7 @@ void SportExecutor::hear(const RpcResponse& response, double now) {
     last_refusal_ = response.code;
     return;
   }
-  if (response.api != static_cast<std::int64_t>(SportCall::kGetFsm)) return;
+  if (response.api != static_cast<std::int64_t>(ServiceCall::kGetFsm)) return;
   const std::optional<int> fsm = fsm_of(response.data);
   if (!fsm) return;
   fsm_ = *fsm;
@@ -139,7 +139,7 @@ std::optional<double> number_at(const nlohmann::json& json, std::string_view key
 bool fsm_walks(int fsm) { return fsm == kFsmStart || fsm == kFsmWaistStart || fsm == kFsmRun; }
 
 RpcRequest velocity_request(std::int64_t id, const VelocityCommand& velocity, double duration) {
-  RpcRequest request{.id = id, .call = SportCall::kSetVelocity, .parameter = {}};
+  RpcRequest request{.id = id, .call = ServiceCall::kSetVelocity, .parameter = {}};
   const double lasts = std::isfinite(duration) ? std::clamp(duration, kShortest, kLongest) : kShortest;
   fmt::format_to_n(request.parameter.data(), request.parameter.size() - 1,
                    "{{\"velocity\":[{:.4f},{:.4f},{:.4f}],\"duration\":{:.2f}}}", printable(velocity.forward),
@@ -148,12 +148,12 @@ RpcRequest velocity_request(std::int64_t id, const VelocityCommand& velocity, do
 }
 
 RpcRequest fsm_request(std::int64_t id, int fsm) {
-  RpcRequest request{.id = id, .call = SportCall::kSetFsm, .parameter = {}};
+  RpcRequest request{.id = id, .call = ServiceCall::kSetFsm, .parameter = {}};
   fmt::format_to_n(request.parameter.data(), request.parameter.size() - 1, "{{\"data\":{}}}", fsm);
   return request;
 }
 
-RpcRequest read_request(std::int64_t id, SportCall call) { return {.id = id, .call = call, .parameter = {}}; }
+RpcRequest read_request(std::int64_t id, ServiceCall call) { return {.id = id, .call = call, .parameter = {}}; }
 
 std::optional<int> fsm_of(std::string_view data) {
   const nlohmann::json json = parsed(data);
@@ -163,18 +163,25 @@ std::optional<int> fsm_of(std::string_view data) {
   return static_cast<int>(*number);
 }
 
-std::optional<SportOrder> order_of(SportCall call, std::string_view parameter) {
+std::optional<std::string> name_of(std::string_view data) {
+  const nlohmann::json json = parsed(data);
+  if (!json.is_object()) return std::nullopt;
+  const auto found = json.find("name");
+  return found != json.end() && found->is_string() ? std::optional(found->get<std::string>()) : std::nullopt;
+}
+
+std::optional<SportOrder> order_of(ServiceCall call, std::string_view parameter) {
   const nlohmann::json json = parsed(parameter);
   if (!json.is_object()) return std::nullopt;
   SportOrder order;
-  if (call == SportCall::kSetFsm) {
+  if (call == ServiceCall::kSetFsm) {
     const std::optional<int> fsm = fsm_of(parameter);
     if (fsm) order.fsm = *fsm;
     return fsm ? std::optional(order) : std::nullopt;
   }
   const auto velocity = json.find("velocity");
   const std::optional<double> duration = number_at(json, "duration");
-  if (call != SportCall::kSetVelocity || !duration || velocity == json.end() || !velocity->is_array() ||
+  if (call != ServiceCall::kSetVelocity || !duration || velocity == json.end() || !velocity->is_array() ||
       velocity->size() != 3)
     return std::nullopt;
   if (!std::ranges::all_of(*velocity, [](const nlohmann::json& v) { return v.is_number(); })) return std::nullopt;

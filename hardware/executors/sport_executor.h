@@ -13,11 +13,18 @@
 
 namespace duet {
 
-// Calls of the maker's service "sport": numbers, and JSON in a string. Facts: docs/hardware.md,
-// "Executors". Pure functions; thread-safe.
+// Calls of the maker's services: numbers, and JSON in a string. Facts: docs/hardware.md, "Executors". Pure functions;
+// thread-safe.
 
-enum class SportCall : std::int64_t {
-  kGetFsm = 7001,  // the state of the maker's own machine; read only
+// The service "motion_switcher" says which mode of the maker's runs (none: a robot in debug mode), and ends it.
+enum class Service { kSport, kMotionSwitcher };
+inline constexpr std::array<std::string_view, 2> kServiceNames = {"sport", "motion_switcher"};
+
+enum class ServiceCall : std::int64_t {
+  kCheckMode = 1001,  // of "motion_switcher"; read only
+  kSelectMode = 1002,
+  kReleaseMode = 1003,
+  kGetFsm = 7001,  // of "sport": the state of the maker's own machine; read only
   kSetFsm = 7101,
   kSetVelocity = 7105,
 };
@@ -27,13 +34,13 @@ inline constexpr int kFsmDamp = 1, kFsmStart = 500, kFsmWaistStart = 501, kFsmRu
 
 struct RpcRequest {
   std::int64_t id = 0;  // ours; a response has the same
-  SportCall call = SportCall::kGetFsm;
+  ServiceCall call = ServiceCall::kGetFsm;
   std::array<char, 96> parameter{};  // JSON, ended by 0
 };
 // A velocity that ends by itself after `duration` [s]: 0.1 to 0.5, whatever is asked. No allocation.
 RpcRequest velocity_request(std::int64_t id, const VelocityCommand& velocity, double duration);
 RpcRequest fsm_request(std::int64_t id, int fsm);
-RpcRequest read_request(std::int64_t id, SportCall call);
+RpcRequest read_request(std::int64_t id, ServiceCall call);
 
 struct RpcResponse {
   std::int64_t id = 0, api = 0;
@@ -42,13 +49,15 @@ struct RpcResponse {
 };
 // The number of {"data": N}; none for anything else.
 std::optional<int> fsm_of(std::string_view data);
+// The text of {"name": TEXT}; none for anything else.
+std::optional<std::string> name_of(std::string_view data);
 // An order to a service; none for a parameter that is not of its call.
 struct SportOrder {
   VelocityCommand velocity;
   double duration = 0.0;  // [s]
   int fsm = -1;
 };
-std::optional<SportOrder> order_of(SportCall call, std::string_view parameter);
+std::optional<SportOrder> order_of(ServiceCall call, std::string_view parameter);
 
 // The topics of the maker's services, as a client sees them; hardware/dds/ has them over DDS.
 class SportWire {

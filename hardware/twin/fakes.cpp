@@ -115,16 +115,16 @@ FakeSport::FakeSport(JointCommand stance, int fsm)
 
 RpcResponse FakeSport::answer(const RpcRequest& request, double now) {
   RpcResponse response{.id = request.id, .api = static_cast<std::int64_t>(request.call), .code = 0, .data = ""};
-  if (request.call == SportCall::kGetFsm) {
+  if (request.call == ServiceCall::kGetFsm) {
     response.data = R"({"data":)" + std::to_string(fsm_) + "}";
     return response;
   }
   const std::optional<SportOrder> order = order_of(request.call, request.parameter.data());
-  if (request.call != SportCall::kSetFsm && request.call != SportCall::kSetVelocity)
+  if (request.call != ServiceCall::kSetFsm && request.call != ServiceCall::kSetVelocity)
     response.code = kUnknownCall;
   else if (!order)
     response.code = kWrongParameter;
-  else if (request.call == SportCall::kSetFsm)
+  else if (request.call == ServiceCall::kSetFsm)
     fsm_ = order->fsm;
   else if (fsm_walks(fsm_)) {
     order_ = *order;
@@ -161,6 +161,22 @@ void FakeSport::write_command(std::uint8_t mode_machine, LowCommandFrame& frame)
     joints_.kd[j] += weight_ * (arms_kd_[j] - stance_.kd[j]);
   }
   build_command(joints_, mode_machine, frame);
+}
+
+RpcResponse FakeSwitcher::answer(const RpcRequest& request) {
+  RpcResponse response{.id = request.id, .api = static_cast<std::int64_t>(request.call), .code = 0, .data = ""};
+  if (request.call == ServiceCall::kCheckMode) {
+    response.data = R"({"form":"0","name":")" + (runs_ ? known_ : "") + R"("})";
+  } else if (request.call == ServiceCall::kReleaseMode) {
+    runs_ = false;
+  } else if (request.call == ServiceCall::kSelectMode) {
+    const bool known = !known_.empty() && name_of(request.parameter.data()) == known_;
+    response.code = known ? 0 : kWrongParameter;
+    runs_ = runs_ || known;
+  } else {
+    response.code = kUnknownCall;
+  }
+  return response;
 }
 
 namespace {

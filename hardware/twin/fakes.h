@@ -75,6 +75,20 @@ class FakeSport {
   long refused_ = 0;
 };
 
+// A stand-in for the maker's motion_switcher. One owner, one thread.
+class FakeSwitcher {
+ public:
+  // `mode`: that runs at first and is the only one there is; empty: none, as on a robot in debug mode.
+  explicit FakeSwitcher(std::string mode = "") : known_(std::move(mode)), runs_(!known_.empty()) {}
+  RpcResponse answer(const RpcRequest& request);
+  // Whether a mode runs: the service of one that was released is silent, and its motors are limp.
+  [[nodiscard]] bool runs() const { return runs_; }
+
+ private:
+  std::string known_;
+  bool runs_;
+};
+
 // A stand-in for a camera and its estimator: a person of a clip, seen with noise. Deterministic by its seed. One owner,
 // one thread.
 

@@ -23,6 +23,12 @@ void check(const TwinOptions& options) {
   require(std::isfinite(options.drift), "twin: expected a finite drift, found {}", options.drift);
 }
 
+std::shared_ptr<const RobotModel> checked_robot(std::shared_ptr<const RobotModel> robot) {
+  require(robot != nullptr && robot->dof() == kG1Motors, "twin: expected a robot of {} joints, found another",
+          kG1Motors);
+  return robot;
+}
+
 bool is_sane(const LowCommandFrame& frame) {
   for (const MotorCommandFrame& motor : frame.motor)
     if (!std::isfinite(motor.q) || !std::isfinite(motor.dq) || !std::isfinite(motor.tau) || !std::isfinite(motor.kp) ||
@@ -48,15 +54,17 @@ TwinOptions noisy_twin(double share, const std::string& engine, std::uint64_t se
 }
 
 TwinModel::TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions& options)
-    : robot_(std::move(robot)), options_(options), random_(options.seed, stream_key({"twin"})) {
-  require(robot_ != nullptr && robot_->dof() == kG1Motors, "twin: expected a robot of {} joints, found another",
-          kG1Motors);
+    : robot_(checked_robot(std::move(robot))),
+      options_(options),
+      random_(options.seed, stream_key({"twin"})),
+      trunk_random_(options.seed, stream_key({"twin", "trunk"})),
+      kinematics_(*robot_),
+      turning_(3, 6 + kG1Motors) {
   check(options_);
   const RobotState standing = robot_->standing_state();
   q_ = standing.q;
   X_WB_ = standing.X_WB;
-  v_.setZero(kG1Motors);
-  tau_.setZero(kG1Motors);
+  for (Eigen::VectorXd* values : {&v_, &a_, &tau_}) values->setZero(kG1Motors);
   asked_.height = X_WB_.p.z();
   if (!options_.engine.empty()) physics_ = std::make_unique<TwinPhysics>(options_.engine, robot_, kTwinPeriod);
 }
@@ -124,16 +132,21 @@ void TwinModel::step_body(double dt) {
 void TwinModel::step(double dt) {
   time_ += dt;
   drifted_ += dt * options_.drift;
-  if (physics_ != nullptr) return step_body(dt);
-  step_joints(dt);
-  step_root(dt);
+  a_ = -v_;
+  if (physics_ != nullptr) {
+    step_body(dt);
+  } else {
+    step_joints(dt);
+    step_root(dt);
+  }
+  a_ = (a_ + v_) / dt;
 }
 
-void TwinModel::write_imu(ImuFrame& imu) {
-  const Eigen::Vector3d lean(condition.roll + options_.tilt_noise * random_.normal(),
-                             options_.tilt_noise * random_.normal(), 0.0);
+void TwinModel::write_imu(const Eigen::Quaterniond& R_WS, double roll, const Eigen::Vector3d& w_WS_S,
+                          const Eigen::Vector3d& force_S, Random& random, ImuFrame& imu) const {
+  const Eigen::Vector3d lean(roll + options_.tilt_noise * random.normal(), options_.tilt_noise * random.normal(), 0.0);
   const double angle = lean.norm();
-  Eigen::Quaterniond R = X_WB_.R;
+  Eigen::Quaterniond R = R_WS;
   if (angle > 0.0) R = R * Eigen::Quaterniond(Eigen::AngleAxisd(angle, lean / angle));
   const double quat_wxyz[4] = {R.w(), R.x(), R.y(), R.z()};
   for (int k = 0; k < 4; ++k) imu.quaternion[k] = static_cast<float>(quat_wxyz[k]);
@@ -142,11 +155,21 @@ void TwinModel::write_imu(ImuFrame& imu) {
   imu.rpy[1] = static_cast<float>(std::asin(std::clamp(down_B.x(), -1.0, 1.0)));
   imu.rpy[2] = static_cast<float>(yaw_of(R));
   for (int axis = 0; axis < 3; ++axis) {
-    imu.gyroscope[axis] = static_cast<float>(w_WB_B_[axis] + options_.gyro_noise * random_.normal());
-    imu.accelerometer[axis] =
-        static_cast<float>(specific_force_B_[axis] + options_.acceleration_noise * random_.normal());
+    imu.gyroscope[axis] = static_cast<float>(w_WS_S[axis] + options_.gyro_noise * random.normal());
+    imu.accelerometer[axis] = static_cast<float>(force_S[axis] + options_.acceleration_noise * random.normal());
   }
-  imu.gyroscope[2] += static_cast<float>(condition.gyro);
+}
+
+void TwinModel::write_trunk_imu(ImuFrame& imu) {
+  imu = {};
+  const int trunk = robot_->frames[robot_->roles.push_frame].link;
+  const Eigen::Quaterniond R_WB = X_WB_.R * Eigen::AngleAxisd(condition.roll, Eigen::Vector3d::UnitX());
+  kinematics_.update({R_WB, X_WB_.p}, q_);
+  kinematics_.angular_jacobian(trunk, turning_);
+  const Eigen::Matrix3d R_TW = kinematics_.R_WL(trunk).transpose();
+  const Eigen::Vector3d w_W = turning_.middleCols<3>(3) * w_WB_B_ + turning_.rightCols(kG1Motors) * v_;
+  write_imu(Eigen::Quaterniond(kinematics_.R_WL(trunk)), 0.0, R_TW * w_W, R_TW * (R_WB * specific_force_B_),
+            trunk_random_, imu);
 }
 
 void TwinModel::write_state(LowStateFrame& frame) {
@@ -154,13 +177,16 @@ void TwinModel::write_state(LowStateFrame& frame) {
   frame.mode_pr = static_cast<std::uint8_t>(condition.mode_pr);
   frame.mode_machine = static_cast<std::uint8_t>(options_.mode_machine + condition.mode_machine_offset);
   frame.tick = ++tick_;
-  write_imu(frame.imu);
+  write_imu(X_WB_.R, condition.roll, w_WB_B_, specific_force_B_, random_, frame.imu);
+  frame.imu.gyroscope[2] += static_cast<float>(condition.gyro);
   for (int j = 0; j < kG1Motors; ++j) {
     MotorStateFrame& motor = frame.motor[j];
     motor.mode = command_.motor[j].mode;
     motor.q = static_cast<float>(q_[j] + options_.joint_noise * random_.normal());
     motor.dq = static_cast<float>(v_[j] + condition.joint_speed + options_.joint_speed_noise * random_.normal());
+    motor.ddq = static_cast<float>(a_[j]);
     motor.tau_est = static_cast<float>(tau_[j]);
+    motor.vol = static_cast<float>(condition.voltage);
     motor.temperature[0] = static_cast<std::int16_t>(condition.casing);
     motor.temperature[1] = static_cast<std::int16_t>(condition.winding);
     motor.motorstate = condition.motor_error ? 1 : 0;

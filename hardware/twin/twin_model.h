@@ -94,6 +94,7 @@ struct TwinCondition {
   double joint_speed = 0.0;              // added to a joint's reported speed [rad/s]
   double gyro = 0.0;                     // added to the reported rate [rad/s]
   double charge = 90.0;                  // of the battery [%]
+  double voltage = 48.0;                 // that its motors report [V]
   bool motor_error = false;
   int mode_pr = 0;
   int mode_machine_offset = 0;
@@ -113,7 +114,11 @@ class TwinModel {
   void meet(const HumanBody& person);
   // Throws std::invalid_argument for another dt than the engine's.
   void step(double dt);
-  void write_state(LowStateFrame& frame);  // with the next tick
+  // With the next tick. Without version, sensors and reserved words, which are 0, as the temperature of an IMU is.
+  void write_state(LowStateFrame& frame);
+  // The second IMU, on the link that pushes reach (the trunk): its own orientation and rate, the base's acceleration in
+  // its axes, and noise of its own.
+  void write_trunk_imu(ImuFrame& imu);
   [[nodiscard]] OdometrySample odometry(double now);
 
   RemoteControl remote{.heard = true};
@@ -133,12 +138,16 @@ class TwinModel {
   void step_joints(double dt);
   void step_root(double dt);
   void step_body(double dt);
-  void write_imu(ImuFrame& imu);
+  // Of an IMU with the axes S, which leans by `roll` about its x.
+  void write_imu(const Eigen::Quaterniond& R_WS, double roll, const Eigen::Vector3d& w_WS_S,
+                 const Eigen::Vector3d& force_S, Random& random, ImuFrame& imu) const;
 
   std::shared_ptr<const RobotModel> robot_;
   TwinOptions options_;
-  Random random_;
-  Eigen::VectorXd q_, v_, tau_;
+  Random random_, trunk_random_;
+  Kinematics kinematics_;
+  Eigen::MatrixXd turning_;  // angular Jacobian of the trunk
+  Eigen::VectorXd q_, v_, a_, tau_;
   Pose X_WB_;
   Eigen::Vector3d v_WB_ = Eigen::Vector3d::Zero();           // [m/s]
   Eigen::Vector3d w_WB_B_ = Eigen::Vector3d::Zero();         // [rad/s]

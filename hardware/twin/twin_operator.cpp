@@ -53,10 +53,11 @@ void TwinOperator::press(double time, TwinModel& twin) {
   const bool press_start = !stood_ && time - damped_since_ > kDampedFor;
   const bool stands = asks_ && let_down_at_ != kNever && time - let_down_at_ > kLetDownFor + kStoodFor;
   if (press_start || (stands && time >= next_press_)) {
-    pressed_ = press_start ? RemoteKey::kStart : RemoteKey::kA;
+    const bool starts = press_start || (!stood_ && pressed_ != RemoteKey::kStart);
+    pressed_ = starts ? RemoteKey::kStart : RemoteKey::kA;
     pressed_until_ = time + kPressed;
     next_press_ = time + kPressedEvery;
-    stood_ = true;
+    stood_ = stood_ || press_start;
   }
   twin.remote.keys = bit(RemoteKey::kR1);
   if (time < pressed_until_) twin.remote.keys |= bit(pressed_);

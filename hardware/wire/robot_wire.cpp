@@ -26,11 +26,15 @@ void check_place(const DdsPlace& place) {
           "network interface: expected the name of one (not 'auto'), found '{}'", excerpt(place.interface));
 }
 
+bool is_twin_place(const DdsPlace& place) {
+  const bool of_twins = place.domain >= kFirstTwinDomain && place.domain <= kLastTwinDomain;
+  return place.interface == "lo" && (of_twins || place.domain == kSimulatorDomain);
+}
+
 void check_twin_place(const DdsPlace& place) {
   check_place(place);
-  require(place.domain >= kFirstTwinDomain && place.interface == "lo",
-          "twin: expected a domain from {} to {} on 'lo', found {} on '{}'", kFirstTwinDomain, kLastTwinDomain,
-          place.domain, place.interface);
+  require(is_twin_place(place), "twin: expected a domain from {} to {}, or {}, on 'lo', found {} on '{}'",
+          kFirstTwinDomain, kLastTwinDomain, kSimulatorDomain, place.domain, place.interface);
 }
 
 }  // namespace duet

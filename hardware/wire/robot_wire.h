@@ -90,6 +90,10 @@ class TwinWire {
   virtual void write(const LowStateFrame& frame) = 0;
   virtual void write(const OdometrySample& sample) = 0;
   virtual void write(const BatteryReading&) {}
+  // The remote control on its own topic; nothing while it is lost.
+  virtual void write(const RemoteControl&) {}
+  // The second IMU, on the trunk.
+  virtual void write(const ImuFrame&) {}
   // How many write commands now.
   virtual int command_writers() = 0;
   // Until a command can be taken, at most so long [s]; false where none came.
@@ -103,13 +107,15 @@ struct DdsPlace {
   std::string interface;  // "eth1", "lo"
 };
 
-// Domains of twins. 0 is the robot's.
-inline constexpr int kFirstTwinDomain = 100, kLastTwinDomain = 199;
+// Domains of twins. 0 is the robot's; 1 on "lo" is that of unitree_mujoco and of the programs that are tried with it.
+inline constexpr int kFirstTwinDomain = 100, kLastTwinDomain = 199, kSimulatorDomain = 1;
+// Whether no robot can be there.
+bool is_twin_place(const DdsPlace& place);
 
 // Throws std::invalid_argument for a domain outside 0 to 199, and for an interface that is empty, "auto", or no name of
 // one.
 void check_place(const DdsPlace& place);
-// The same, and that it is a twin's: domain 100 to 199 on "lo".
+// The same, and that it is a twin's: domain 100 to 199, or 1, on "lo".
 void check_twin_place(const DdsPlace& place);
 
 }  // namespace duet

@@ -62,6 +62,10 @@ TEST(Arming, NeedsAConfigurationThatAllowsMotionAndNamesEverything) {
 TEST(Arming, ATwinIsNotARobot) {
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.twin = true; }));
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.permission.domain = 100; }));
+  EXPECT_SENTENCE(refusal([](ArmingFacts& f) {
+    f.permission.domain = 1;
+    f.permission.interface = "lo";
+  }));
 }
 
 TEST(Arming, NeedsTheRobotThatIsConfigured) {

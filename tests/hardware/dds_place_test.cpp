@@ -22,7 +22,9 @@ TEST(DdsPlace, NeedsADomain) {
 TEST(DdsPlace, ATwinsIsOnLoopbackInDomainsOfItsOwn) {
   EXPECT_NO_THROW(check_twin_place({100, "lo"}));
   EXPECT_NO_THROW(check_twin_place({199, "lo"}));
-  for (const DdsPlace& place : {DdsPlace{0, "lo"}, DdsPlace{99, "lo"}, DdsPlace{150, "eth0"}})
+  EXPECT_NO_THROW(check_twin_place({1, "lo"}));  // unitree_mujoco's
+  for (const DdsPlace& place :
+       {DdsPlace{0, "lo"}, DdsPlace{2, "lo"}, DdsPlace{99, "lo"}, DdsPlace{150, "eth0"}, DdsPlace{1, "eth0"}})
     EXPECT_SENTENCE(test::thrown_message<std::invalid_argument>([&] { check_twin_place(place); }));
 }
 

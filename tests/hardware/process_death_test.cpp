@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <memory>
+#include <sstream>
 
 #include "duet/core/file.h"
 #include "duet/hardware/wire/robot_wire.h"
@@ -39,8 +41,8 @@ struct ArmedTrial {
                "mode_machine: 5\ndomain: " +
                    domain_text() + "\n" + more);
     twin = std::make_unique<OwnProcess>(
-        std::vector<std::string>{DUET_TWIN, services.empty() ? "--operated" : "--presses", "--seconds", "60",
-                                 "--domain", domain_text(), "--velocity-port", death_port()});
+        std::vector<std::string>{DUET_TWIN, "--operated", "--seconds", "60", "--domain", domain_text(),
+                                 "--velocity-port", death_port()});
     if (!services.empty()) {
       std::vector<std::string> all = {DUET_SERVICES,     "--seconds",  "60",         "--domain",  domain_text(),
                                       "--velocity-port", death_port(), "--lcm-port", death_port()};
@@ -162,6 +164,75 @@ TEST(ProcessDeath, ATwinRunsThroughHomiesProcessesAndHoldsWhenTheyDie) {
             },
             "executor: homie-lcm\nodometry: twin\nlcm: {interface: lo, port: " + death_port() + "}\n", {"--homie"});
 }
+
+// A comment's line that begins so, without its "#".
+std::vector<std::string> printed_lines(const std::string& file, const std::string& program) {
+  std::vector<std::string> lines;
+  std::istringstream text(read_text(file));
+  for (std::string line; std::getline(text, line);)
+    if (line.starts_with("#   " + program)) lines.push_back(line.substr(4));
+  return lines;
+}
+
+// The programs of a printed line, as they are built here, in a domain and at a port that others hardly have.
+std::vector<std::string> words_of(const std::string& line, const test::ScratchFolder& folder) {
+  const std::map<std::string, std::string> here = {{"duet", DUET_PROGRAM},
+                                                   {"duet-g1-twin", DUET_TWIN},
+                                                   {"duet-g1-services", DUET_SERVICES},
+                                                   {"150", domain_text()},
+                                                   {"15001", death_port()},
+                                                   {"run.mcap", folder / "run.mcap"}};
+  std::vector<std::string> words;
+  std::istringstream text(line);
+  for (std::string word; text >> word;) {
+    const auto found = here.find(word);
+    words.push_back(found != here.end()                    ? found->second
+                    : word.starts_with("examples/hardware") ? folder / "example.yaml"
+                                                            : word);
+  }
+  return words;
+}
+
+// An example starts as it prints it: its own lines, one after the other, and the word typed. Its file is the one of the
+// example but for domain and ports, and the guard's socket is told, as two of these may run on one machine.
+void expect_to_start_as_printed(const std::string& example) {
+  const std::string file = std::string(DUET_EXAMPLES) + "/" + example;
+  std::string said;
+  for (int k = 0; k < kTrials; ++k) {
+    const test::ScratchFolder folder;
+    std::string text = read_text(file);
+    text.replace(text.find("domain: 150"), 11, "domain: " + domain_text());
+    if (const std::size_t lcm = text.find("lcm: {interface: lo}"); lcm != std::string::npos)
+      text.replace(lcm, 20, "lcm: {interface: lo, port: " + death_port() + "}");
+    write_file(folder / "example.yaml", text);
+    std::vector<std::unique_ptr<OwnProcess>> beside;
+    for (const std::string& line : printed_lines(file, "duet-g1-")) {
+      std::vector<std::string> words = words_of(line, folder);
+      words.insert(words.end(), {"--seconds", "60"});
+      if (line.starts_with("duet-g1-services")) words.insert(words.end(), {"--lcm-port", death_port()});
+      beside.push_back(std::make_unique<OwnProcess>(words));
+    }
+    ASSERT_EQ(beside.size(), 2u) << file;
+    const std::vector<std::string> armed = printed_lines(file, "duet hw arm");
+    const std::vector<std::string> run = printed_lines(file, "duet hw run");
+    ASSERT_EQ(armed.size() + run.size(), 2u) << file;
+    std::vector<std::string> words = words_of(armed[0], folder), plan = words_of(run[0], folder);
+    for (std::vector<std::string>* all : {&words, &plan}) all->insert(all->end(), {"--socket", folder / "guard"});
+    OwnProcess guard(words, true);
+    if (!test::arm_by_its_word(guard) || !guard.says("armed (none)", 10.0)) {
+      said = guard.said();
+      continue;
+    }
+    OwnProcess planner(plan, true);
+    if (guard.says("run (none)", 15.0)) return;
+    said = guard.said();
+    ASSERT_TRUE(held_up(said, "")) << "the guard said:\n" << said;
+  }
+  GTEST_SKIP() << "not run: this machine held the guard up in each of " << kTrials << " trials; it said:\n" << said;
+}
+
+TEST(ProcessDeath, TheExampleOfHomieStartsAsPrinted) { expect_to_start_as_printed("homie.yaml"); }
+TEST(ProcessDeath, TheExampleOfTheMakersServiceStartsAsPrinted) { expect_to_start_as_printed("sport.yaml"); }
 
 TEST(ProcessDeath, ATwinRunsThroughTheMakersServiceAndHoldsWhenItDies) {
   try_until("executor_age",

@@ -1,6 +1,8 @@
 // The maker's walking as the executor, with a stand-in for its service in memory.
 #include "duet/hardware/executors/sport_executor.h"
 
+#include <fmt/format.h>
+
 #include <deque>
 #include <limits>
 
@@ -37,7 +39,7 @@ class MemorySport final : public SportWire {
     service_.obey_arms(frame);
     return true;
   }
-  [[nodiscard]] long asked(SportCall call) const {
+  [[nodiscard]] long asked(ServiceCall call) const {
     return std::ranges::count_if(requests, [call](const RpcRequest& r) { return r.call == call; });
   }
 
@@ -81,7 +83,7 @@ struct SportTrial {
 TEST(SportExecutor, AsksNothingButItsStateBeforeItIsOpened) {
   SportTrial trial;
   trial.run_for(1.0, targets(0.1f), {0.2, 0.0, 0.0, 0.74}, SafetyState::kReady);
-  EXPECT_EQ(trial.wire.asked(SportCall::kGetFsm), static_cast<long>(trial.wire.requests.size()));
+  EXPECT_EQ(trial.wire.asked(ServiceCall::kGetFsm), static_cast<long>(trial.wire.requests.size()));
   EXPECT_NEAR(static_cast<double>(trial.wire.requests.size()), 10.0, 1.0);
   EXPECT_TRUE(trial.wire.frames.empty());
   EXPECT_NEAR(trial.executor.heard_at(), trial.wire.now, 0.15);
@@ -93,7 +95,7 @@ TEST(SportExecutor, AMachineThatAnswersAndDoesNotWalkIsNotHeard) {
   MemorySport wire(damped);
   SportExecutor executor(wire, kDt);
   for (; wire.now < 1.0; wire.now += kDt) executor.poll(wire.now);
-  EXPECT_GT(wire.asked(SportCall::kGetFsm), 5);
+  EXPECT_GT(wire.asked(ServiceCall::kGetFsm), 5);
   EXPECT_EQ(executor.heard_at(), kNever);
 }
 
@@ -101,7 +103,7 @@ TEST(SportExecutor, AVelocityEndsByItselfWhenNobodyRenewsIt) {
   SportTrial trial;
   trial.executor.open();
   trial.run_for(1.0, targets(0.1f), {0.2, 0.0, -0.1, 0.74}, SafetyState::kRun);
-  EXPECT_NEAR(static_cast<double>(trial.wire.asked(SportCall::kSetVelocity)), 10.0, 1.0);
+  EXPECT_NEAR(static_cast<double>(trial.wire.asked(ServiceCall::kSetVelocity)), 10.0, 1.0);
   EXPECT_NEAR(trial.service.velocity(trial.wire.now).forward, 0.2, 1e-4);
   EXPECT_NEAR(trial.service.velocity(trial.wire.now).yaw_rate, -0.1, 1e-4);
   EXPECT_EQ(trial.service.velocity(trial.wire.now + 0.31).forward, 0.0);  // the guard has died
@@ -140,9 +142,9 @@ TEST(SportExecutor, DampingAsksTheServiceToDampUntilItDoes) {
   trial.run_for(5.5, targets(0.1f), {}, SafetyState::kRun);
   trial.run_for(0.5, damping, {}, SafetyState::kDamp);
   EXPECT_EQ(trial.service.fsm(), kFsmDamp);
-  const long asked = trial.wire.asked(SportCall::kSetFsm);
+  const long asked = trial.wire.asked(ServiceCall::kSetFsm);
   trial.run_for(4.7, damping, {}, SafetyState::kDamp);
-  EXPECT_EQ(trial.wire.asked(SportCall::kSetFsm), asked);
+  EXPECT_EQ(trial.wire.asked(ServiceCall::kSetFsm), asked);
   EXPECT_NEAR(trial.executor.arm_weight(), 0.0, 1e-9);  // gone with the five seconds of damping
   EXPECT_SENTENCE(trial.executor.complaint());
 }
@@ -175,23 +177,46 @@ TEST(FakeSport, RefusesFramesAndCallsThatAreWrong) {
   RpcRequest request = velocity_request(7, {0.1, 0.0, 0.0, 0.0}, 0.3);
   request.parameter[0] = '[';
   EXPECT_NE(service.answer(request, 0.0).code, 0);
-  request.call = static_cast<SportCall>(1234);
+  request.call = static_cast<ServiceCall>(1234);
   EXPECT_NE(service.answer(request, 0.0).code, 0);
-  EXPECT_EQ(service.answer(read_request(9, SportCall::kGetFsm), 0.0).id, 9);
+  EXPECT_EQ(service.answer(read_request(9, ServiceCall::kGetFsm), 0.0).id, 9);
+}
+
+TEST(FakeSwitcher, SaysWhichModeRunsAndReleasesIt) {
+  FakeSwitcher debug, walking("ai");
+  const RpcRequest check = read_request(3, ServiceCall::kCheckMode);
+  EXPECT_EQ(debug.answer(check).data, R"({"form":"0","name":""})");
+  EXPECT_EQ(walking.answer(check).data, R"({"form":"0","name":"ai"})");
+  EXPECT_EQ(walking.answer(check).id, 3);
+  EXPECT_EQ(walking.answer(read_request(4, ServiceCall::kReleaseMode)).code, 0);
+  EXPECT_EQ(walking.answer(check).data, R"({"form":"0","name":""})");
+  EXPECT_FALSE(walking.runs());
+  const auto select = [](std::string_view name) {
+    RpcRequest request = read_request(5, ServiceCall::kSelectMode);
+    fmt::format_to_n(request.parameter.data(), request.parameter.size() - 1, R"({{"name":"{}"}})", name);
+    return request;
+  };
+  EXPECT_NE(walking.answer(select("normal")).code, 0);
+  EXPECT_NE(walking.answer(read_request(6, ServiceCall::kSelectMode)).code, 0);
+  EXPECT_FALSE(walking.runs());
+  EXPECT_EQ(walking.answer(select("ai")).code, 0);
+  EXPECT_TRUE(walking.runs());
+  EXPECT_NE(debug.answer(select("")).code, 0);
+  EXPECT_NE(debug.answer(read_request(7, ServiceCall::kGetFsm)).code, 0);
 }
 
 TEST(SportRpc, WritesTheParametersThatTheMakersClientWrites) {
   EXPECT_STREQ(velocity_request(1, {0.2, -0.1, 0.05, 0.74}, 0.3).parameter.data(),
                R"({"velocity":[0.2000,-0.1000,0.0500],"duration":0.30})");
   EXPECT_STREQ(fsm_request(2, 1).parameter.data(), R"({"data":1})");
-  EXPECT_STREQ(read_request(3, SportCall::kGetFsm).parameter.data(), "");
+  EXPECT_STREQ(read_request(3, ServiceCall::kGetFsm).parameter.data(), "");
 }
 
 TEST(SportRpc, NoVelocityLastsLongerThanHalfASecondAndNoneIsNotANumber) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   for (const double asked : {-1.0, 0.0, 0.2, 864000.0, nan, inf}) {
     const auto order =
-        order_of(SportCall::kSetVelocity, velocity_request(1, {nan, inf, 1e30, 0.0}, asked).parameter.data());
+        order_of(ServiceCall::kSetVelocity, velocity_request(1, {nan, inf, 1e30, 0.0}, asked).parameter.data());
     ASSERT_TRUE(order) << asked;
     EXPECT_GE(order->duration, 0.1) << asked;
     EXPECT_LE(order->duration, 0.5) << asked;
@@ -210,8 +235,8 @@ TEST(SportRpc, ReadsAnswersAndNothingElse) {
   EXPECT_FALSE(fsm_of(long_one));
   for (const char* wrong : {"", R"({"velocity":[1,2],"duration":1})", R"({"velocity":[1,2,"x"],"duration":1})",
                             R"({"velocity":[1,2,3]})", R"({"velocity":{},"duration":1})"})
-    EXPECT_FALSE(order_of(SportCall::kSetVelocity, wrong)) << wrong;
-  EXPECT_FALSE(order_of(SportCall::kGetFsm, R"({"data":1})"));
+    EXPECT_FALSE(order_of(ServiceCall::kSetVelocity, wrong)) << wrong;
+  EXPECT_FALSE(order_of(ServiceCall::kGetFsm, R"({"data":1})"));
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "duet/hardware/twin/twin_model.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "duet/hardware/wire/low_level_frame.h"
@@ -75,6 +77,44 @@ TEST(TwinModel, ItsImusAnglesAreThoseOfItsQuaternion) {
     const float* wxyz = frame.imu.quaternion;
     EXPECT_LT(R.angularDistance(Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3])), 1e-5) << k;
   }
+}
+
+// Its second IMU is on the trunk: turned by the waist, with the waist's rate. Motors say how fast they gain speed.
+TEST(TwinModel, ItsSecondImuTurnsWithTheWaist) {
+  TwinModel twin(test::g1(), {});
+  twin.condition.roll = 0.2;
+  JointCommand command = test::g1()->default_command(test::g1()->neutral);
+  command.q_target[12] += 0.6;  // waist yaw
+  LowCommandFrame frame;
+  build_command(command, 5, frame);
+  twin.obey(frame);
+  double largest = 0.0;
+  for (int step = 0; step < 500; ++step) {
+    const double before = twin.q()[12];
+    LowStateFrame last, state;
+    twin.write_state(last);
+    twin.step(kDt);
+    twin.write_state(state);
+    ImuFrame trunk;
+    twin.write_trunk_imu(trunk);
+    EXPECT_NEAR(trunk.gyroscope[2], (twin.q()[12] - before) / kDt, 1e-4) << step;
+    EXPECT_NEAR(state.motor[12].ddq, (state.motor[12].dq - last.motor[12].dq) / kDt, 1e-2) << step;
+    largest = std::max(largest, std::abs(static_cast<double>(trunk.gyroscope[2])));
+  }
+  EXPECT_GT(largest, 0.1);
+  LowStateFrame state;
+  ImuFrame trunk;
+  twin.write_state(state);
+  twin.write_trunk_imu(trunk);
+  EXPECT_NEAR(state.imu.rpy[0], 0.2, 1e-5);
+  const auto read = [](const float* wxyz) { return Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]); };
+  const Eigen::Quaterniond R_BT = read(state.imu.quaternion).conjugate() * read(trunk.quaternion);
+  EXPECT_LT(R_BT.angularDistance(yaw_rotation(twin.q()[12])), 1e-5);
+  EXPECT_GT(twin.q()[12], 0.4);
+  const Eigen::Vector3d up_T = read(trunk.quaternion).conjugate() * Eigen::Vector3d::UnitZ();
+  for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(trunk.accelerometer[axis], kGravity * up_T[axis], 1e-4);
+  EXPECT_EQ(state.motor[3].vol, 48.0f);
+  EXPECT_EQ(state.motor[30].vol, 0.0f);  // the robot has 29
 }
 
 TEST(TwinModel, OdometryDrifts) {

@@ -158,6 +158,27 @@ TEST(TwinOperator, LetsNobodyDownWhoseArmsStillMove) {
   EXPECT_EQ(twin.physics()->hanging(), 1.0);
 }
 
+// HOMIE's processes hold the motors from the begin on: nobody sees at the twin when the guard is armed.
+TEST(TwinOperator, PressesStartAndAInTurnWhereOthersHoldTheMotors) {
+  TwinModel twin(test::g1(), {});
+  TwinOperator person;
+  twin.obey(frame_of(test::g1()->default_command(test::g1()->neutral)));
+  long starts = 0, runs = 0;
+  std::uint16_t before = 0;
+  for (int k = 0; k < 5000; ++k) {
+    person.tick(twin.time(), twin);
+    twin.step(kTwinPeriod);
+    if (twin.remote.keys != before) {
+      starts += twin.remote.holds(RemoteKey::kStart) ? 1 : 0;
+      runs += twin.remote.holds(RemoteKey::kA) ? 1 : 0;
+    }
+    before = twin.remote.keys;
+    EXPECT_TRUE(twin.remote.holds(RemoteKey::kR1));
+  }
+  EXPECT_GE(starts, 5);
+  EXPECT_GE(runs, 5);
+}
+
 TEST(TwinOperator, StandsItUpLetsItDownAndAsksItToRun) {
   NEEDS_MUJOCO();
   TwinModel twin(test::g1(), simulated());
