@@ -200,30 +200,17 @@ class Loan {
 class DdsSportWire final : public SportWire {
  public:
   explicit DdsSportWire(const DdsPlace& place)
-      : participant_(place),
-        responses_(participant_.reader(unitree_api_msg_dds__Response__desc,
-                                       topic_of(Service::kSport, "response").c_str(), kCallsKept)),
-        requests_(participant_.writer(unitree_api_msg_dds__Request__desc, topic_of(Service::kSport, "request").c_str(),
-                                      kCallsKept)),
-        others_(participant_) {}
+      : participant_(place), sport_(open(Service::kSport)), arm_(open(Service::kArm)), others_(participant_) {}
 
-  bool take(RpcResponse& response) override {
-    const Loan<ResponseSample> loan(responses_);
-    const ResponseSample* sample = loan.get();
-    if (sample == nullptr) return false;
-    response.id = sample->header.identity.id;
-    response.api = sample->header.identity.api_id;
-    response.code = sample->header.status.code;
-    response.data = sample->data == nullptr ? "" : sample->data;
-    return true;
-  }
+  bool take(RpcResponse& response) override { return take(sport_, response) || take(arm_, response); }
   bool request(const RpcRequest& request) override {
     RequestSample sample{};
     sample.header.identity.id = request.id;
     sample.header.identity.api_id = static_cast<std::int64_t>(request.call);
     parameter_ = request.parameter;
     sample.parameter = parameter_.data();
-    return dds_write(requests_, &sample) == DDS_RETCODE_OK;
+    const Calls& calls = service_of(request.call) == Service::kArm ? arm_ : sport_;
+    return dds_write(calls.requests, &sample) == DDS_RETCODE_OK;
   }
   int arm_writers() override { return others_.of(kArmTopic); }
   void open_arms() override {
@@ -238,8 +225,28 @@ class DdsSportWire final : public SportWire {
   }
 
  private:
+  struct Calls {
+    dds_entity_t requests = 0, responses = 0;
+  };
+  Calls open(Service service) {
+    return {participant_.writer(unitree_api_msg_dds__Request__desc, topic_of(service, "request").c_str(), kCallsKept),
+            participant_.reader(unitree_api_msg_dds__Response__desc, topic_of(service, "response").c_str(),
+                                kCallsKept)};
+  }
+  static bool take(const Calls& calls, RpcResponse& response) {
+    const Loan<ResponseSample> loan(calls.responses);
+    const ResponseSample* sample = loan.get();
+    if (sample == nullptr) return false;
+    response.id = sample->header.identity.id;
+    response.api = sample->header.identity.api_id;
+    response.code = sample->header.status.code;
+    response.data = sample->data == nullptr ? "" : sample->data;
+    return true;
+  }
+
   Participant participant_;
-  dds_entity_t responses_, requests_, arms_ = 0;
+  Calls sport_, arm_;
+  dds_entity_t arms_ = 0;
   WriterCount others_;
   std::array<char, 96> parameter_{};
 };

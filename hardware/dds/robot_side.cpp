@@ -1,6 +1,7 @@
 #include "duet/hardware/dds/robot_side.h"
 
 #include "duet/core/require.h"
+#include "duet/hardware/executors/arm_action.h"
 #include "duet/hardware/executors/homie_executor.h"
 #include "duet/hardware/wire/odometry_source.h"
 
@@ -11,7 +12,7 @@ namespace {
 // maker's walking the number is not known.
 int expected_writers(ExecutorKind kind) {
   constexpr int kAny = 1000;
-  if (kind == ExecutorKind::kSport) return kAny;
+  if (is_makers(kind)) return kAny;
   return kind == ExecutorKind::kHomieLcm ? 1 : 0;
 }
 
@@ -45,9 +46,10 @@ void RobotSide::make_executor(const RobotConfig& config, const RobotSideOptions&
   const ExecutorKind kind = options.commands ? config.executor : ExecutorKind::kTwin;
   if (kind == ExecutorKind::kHomieLcm) {
     executor_ = std::make_unique<HomieExecutor>(config.lcm, config.limits.height, options.period);
-  } else if (kind == ExecutorKind::kSport) {
+  } else if (is_makers(kind)) {
     sport_ = open_sport_wire(config.place());
-    executor_ = std::make_unique<SportExecutor>(*sport_, options.period);
+    const int action = config.arm_action.empty() ? 0 : arm_preset(config.arm_action).id;
+    executor_ = std::make_unique<SportExecutor>(*sport_, options.period, action);
   } else {
     require(!options.commands || kind == ExecutorKind::kLowcmd || options.velocity_port > 0,
             "executor 'twin': expected a port that takes its velocities (--velocity-port), found none");

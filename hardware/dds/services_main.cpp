@@ -12,6 +12,7 @@
 
 #include "duet/hardware/dds/dds_wire.h"
 #include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/twin/fake_arms.h"
 #include "duet/hardware/twin/fakes.h"
 #include "duet/hardware/wire/datagram_socket.h"
 #include "duet/hardware/wire/lcm_message.h"
@@ -128,11 +129,12 @@ void play_homie(const ServicesArguments& arguments) {
 
 void play_sport(const ServicesArguments& arguments) {
   TwinMotors motors(arguments);
-  constexpr Service kServed[] = {Service::kSport, Service::kMotionSwitcher};
+  constexpr Service kServed[] = {Service::kSport, Service::kMotionSwitcher, Service::kArm};
   const std::unique_ptr<ServicesWire> wire = open_services(arguments.place, kServed);
   FakeSwitcher switcher(kMakersMode);
   const std::shared_ptr<const RobotModel> robot = load_shared_robot();
   FakeSport service(robot->default_command(robot->neutral), arguments.fsm);
+  FakeArms arms(robot);
   long calls = 0;
   every_period(arguments, [&](double now) {
     answer_switcher(*wire, switcher);
@@ -140,9 +142,15 @@ void play_sport(const ServicesArguments& arguments) {
     for (; wire->take(Service::kSport, request); ++calls)
       if (switcher.runs()) wire->respond(Service::kSport, service.answer(request, now));
     LowCommandFrame frame;
-    while (wire->take_arms(frame)) service.obey_arms(frame);
+    while (wire->take_arms(frame)) {
+      service.obey_arms(frame);
+      arms.see_others(now);
+    }
+    for (; wire->take(Service::kArm, request); ++calls)
+      if (switcher.runs()) wire->respond(Service::kArm, arms.answer(request, now, service.fsm()));
     if (!motors.listen()) return;
     if (!switcher.runs()) return motors.release();
+    if (arms.write_arms(motors.machine(), now, frame)) service.obey_arms(frame);
     service.write_command(motors.machine(), frame);
     motors.write(frame, service.velocity(now));
   });
@@ -178,7 +186,7 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", arguments.seconds, "for which it runs; 0: until it is stopped");
   CLI::Option_group* what = app.add_option_group("what");
   what->add_flag("--homie", arguments.homie, "HOMIE's processes, over LCM on lo");
-  what->add_flag("--sport", arguments.sport, "the maker's walking and its arm topic");
+  what->add_flag("--sport", arguments.sport, "the maker's walking, its arm topic and its preset arm actions");
   what->add_flag("--switcher", arguments.switcher,
                  "the maker's motion_switcher alone, which says that no mode runs: a robot in debug mode");
   what->add_flag("--echo", arguments.echo, "answers every command with a state");

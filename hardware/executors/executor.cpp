@@ -22,6 +22,8 @@ std::string joint_names(const std::vector<int>& joints, const RobotModel& robot,
 
 }  // namespace
 
+bool is_makers(ExecutorKind kind) { return kind == ExecutorKind::kSport || kind == ExecutorKind::kVendorArmAction; }
+
 std::string_view executor_name(ExecutorKind kind) { return kExecutorNames[static_cast<std::size_t>(kind)]; }
 
 ExecutorKind executor_kind(const std::string& name) {
@@ -54,11 +56,16 @@ ExecutedChannels executed_channels(ExecutorKind kind, const RobotModel& robot, c
       channels.legs = "by the maker's walking: this is not HOMIE";
       channels.stop = "asks the maker's service to damp; velocities end by themselves after 0.3 s";
       break;
+    case ExecutorKind::kVendorArmAction:
+      channels.joints.clear();
+      channels.legs = "by the maker's walking, arms by its preset action, which no limit here reaches: this is not HOMIE";
+      channels.stop = "asks the maker's services to release the arms and to damp";
+      break;
   }
   channels.executed.assign(kRootChannels + robot.joints.size(), false);
   for (const std::size_t k : kVelocityChannels) channels.executed[k] = true;
   channels.executed[2] = channels.height;
-  for (const int joint : joints) channels.executed[kRootChannels + static_cast<std::size_t>(joint)] = true;
+  for (const int joint : channels.joints) channels.executed[kRootChannels + static_cast<std::size_t>(joint)] = true;
   return channels;
 }
 
@@ -83,7 +90,7 @@ std::string executed_channels_text(const ExecutedChannels& channels, const Robot
 
 std::string executor_refusal(ExecutorKind kind, OdometrySource odometry, bool twin) {
   if (!twin && kind == ExecutorKind::kTwin)
-    return "executor 'twin' is a twin's: a robot has 'lowcmd', 'homie-lcm' or 'sport'";
+    return "executor 'twin' is a twin's: a robot has 'lowcmd', 'homie-lcm', 'sport' or 'vendor-arm-action'";
   if (odometry == OdometrySource::kNone)
     return "no source of odometry: expected one of legs, external, vendor; without measured odometry nothing walks "
            "(supplement A.4.3)";
@@ -103,7 +110,7 @@ std::string walker_refusal(ExecutorKind kind, const std::string& walker, bool to
         "executor 'lowcmd' commands every motor: expected a controller that is told velocities and keeps the robot on "
         "its feet (--walker homie), found {}",
         walker.empty() ? "none" : fmt::format("'{}'", walker));
-  if (!walker.empty() && (kind == ExecutorKind::kHomieLcm || kind == ExecutorKind::kSport))
+  if (!walker.empty() && (kind == ExecutorKind::kHomieLcm || is_makers(kind)))
     return fmt::format("executor '{}' walks by itself: expected no --walker, found '{}'", executor_name(kind), walker);
   return "";
 }

@@ -20,9 +20,13 @@ enum class ExecutorKind {
   kHomieLcm,  // HOMIE's processes, over LCM
   kSport,     // the maker's walking, over DDS: not HOMIE
   kLowcmd,    // the guard's own frames to a robot; a walking controller in the guard keeps it on its feet
+  kVendorArmAction,  // the maker's walking and one of its preset arm actions, which nothing here limits
 };
-inline constexpr std::array<std::string_view, 4> kExecutorNames = {"twin", "homie-lcm", "sport", "lowcmd"};
+inline constexpr std::array<std::string_view, 5> kExecutorNames = {"twin", "homie-lcm", "sport", "lowcmd",
+                                                                   "vendor-arm-action"};
 std::string_view executor_name(ExecutorKind kind);
+// Whether the maker's own walking carries it out.
+bool is_makers(ExecutorKind kind);
 // Throws std::invalid_argument with the known names.
 ExecutorKind executor_kind(const std::string& name);
 

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "duet/hardware/executors/arm_action.h"
 #include "duet/hardware/wire/low_level_frame.h"
 
 namespace duet {
@@ -26,7 +28,8 @@ bool stands_still(const VelocityCommand& v) { return v.forward == 0.0 && v.later
 
 }  // namespace
 
-SportExecutor::SportExecutor(SportWire& wire, double period) : wire_(wire), period_(period) {}
+SportExecutor::SportExecutor(SportWire& wire, double period, int action)
+    : wire_(wire), period_(period), action_(action) {}
 
 SportExecutor::~SportExecutor() { close(); }
 
@@ -63,7 +66,7 @@ std::string SportExecutor::complaint() const {
 
 void SportExecutor::open() {
   if (open_) return;
-  wire_.open_arms();
+  if (action_ == 0) wire_.open_arms();
   open_ = true;
   weight_ = 0.0;
   has_arms_ = moved_ = false;
@@ -72,6 +75,7 @@ void SportExecutor::open() {
 void SportExecutor::close() {
   if (!open_) return;
   wire_.request(velocity_request(next_id_++, {}, kVelocityLasts));
+  if (std::exchange(acts_, false)) wire_.request(action_request(next_id_++, kReleaseArm));
   wire_.close_arms();
   open_ = false;
 }
@@ -79,6 +83,7 @@ void SportExecutor::close() {
 // The guard's frame with the arms alone, and the weight in the motor behind the last.
 bool SportExecutor::write(const LowCommandFrame& frame) {
   if (!open_) return false;
+  if (action_ != 0) return true;
   bool damps = true;
   for (int j = kArmsFrom; j < kG1Motors; ++j) damps = damps && frame.motor[j].kp == 0.0f;
   if (!damps) {
@@ -108,6 +113,12 @@ void SportExecutor::send(const VelocityCommand& velocity) {
 
 void SportExecutor::enter(SafetyState state) {
   state_ = state;
+  const bool acts = state == SafetyState::kRun;
+  if (open_ && action_ != 0 && acts != acts_) {
+    wire_.request(action_request(next_id_++, acts ? action_ : kReleaseArm));
+    acts_ = acts;
+    moved_ = true;
+  }
   if (!open_ || !moved_ || state < SafetyState::kDamp || fsm_ == kFsmDamp || !every(kDampPeriod)) return;
   wire_.request(fsm_request(next_id_++, kFsmDamp));
 }
@@ -135,6 +146,23 @@ std::optional<double> number_at(const nlohmann::json& json, std::string_view key
 }
 
 }  // namespace
+
+Service service_of(ServiceCall call) {
+  switch (call) {
+    case ServiceCall::kCheckMode:
+    case ServiceCall::kSelectMode:
+    case ServiceCall::kReleaseMode:
+      return Service::kMotionSwitcher;
+    case ServiceCall::kDoArmAction:
+    case ServiceCall::kListArmActions:
+      return Service::kArm;
+    case ServiceCall::kGetFsm:
+    case ServiceCall::kSetFsm:
+    case ServiceCall::kSetVelocity:
+      break;
+  }
+  return Service::kSport;
+}
 
 bool fsm_walks(int fsm) { return fsm == kFsmStart || fsm == kFsmWaistStart || fsm == kFsmRun; }
 

@@ -1,5 +1,6 @@
 // The maker's own walking as the executor: velocities that end by themselves go to its service, arm targets to its arm
-// topic, whose weight rises slowly. Its balance stays its own. This is not HOMIE, and says so. One owner, one thread.
+// topic, whose weight rises slowly. Its balance stays its own. This is not HOMIE, and says so. With a preset action its
+// arms are the maker's too: told when the guard begins to run, released when it ends to. One owner, one thread.
 #pragma once
 
 #include <array>
@@ -17,8 +18,8 @@ namespace duet {
 // thread-safe.
 
 // The service "motion_switcher" says which mode of the maker's runs (none: a robot in debug mode), and ends it.
-enum class Service { kSport, kMotionSwitcher };
-inline constexpr std::array<std::string_view, 2> kServiceNames = {"sport", "motion_switcher"};
+enum class Service { kSport, kMotionSwitcher, kArm };
+inline constexpr std::array<std::string_view, 3> kServiceNames = {"sport", "motion_switcher", "arm"};
 
 enum class ServiceCall : std::int64_t {
   kCheckMode = 1001,  // of "motion_switcher"; read only
@@ -27,7 +28,10 @@ enum class ServiceCall : std::int64_t {
   kGetFsm = 7001,  // of "sport": the state of the maker's own machine; read only
   kSetFsm = 7101,
   kSetVelocity = 7105,
+  kDoArmAction = 7106,  // of "arm" (hardware/executors/arm_action.h)
+  kListArmActions = 7107,
 };
+[[nodiscard]] Service service_of(ServiceCall call);
 // States of the maker's machine.
 inline constexpr int kFsmDamp = 1, kFsmStart = 500, kFsmWaistStart = 501, kFsmRun = 801;
 [[nodiscard]] bool fsm_walks(int fsm);
@@ -75,8 +79,9 @@ class SportWire {
 
 class SportExecutor final : public Executor {
  public:
-  // `period` of the guard's ticks [s].
-  SportExecutor(SportWire& wire, double period);
+  // `period` of the guard's ticks [s]. `action`: number of a preset arm action (executor `vendor-arm-action`), which
+  // takes the place of the arm targets; 0: none.
+  SportExecutor(SportWire& wire, double period, int action = 0);
   ~SportExecutor() override;
 
   void poll(double now) override;
@@ -84,8 +89,9 @@ class SportExecutor final : public Executor {
   [[nodiscard]] double heard_at() const override { return heard_at_; }
   [[nodiscard]] bool answers() const override { return true; }
   [[nodiscard]] std::string complaint() const override;
-  // The maker's own controller may write the low-level topic; the arm topic is ours alone.
-  int foreign_writers(int) override { return wire_.arm_writers(); }
+  // The maker's own controller may write the low-level topic, and its actions the arm topic; without one that is ours
+  // alone.
+  int foreign_writers(int) override { return action_ != 0 ? 0 : wire_.arm_writers(); }
   void open() override;
   void close() override;
   [[nodiscard]] bool is_open() const override { return open_; }
@@ -102,6 +108,8 @@ class SportExecutor final : public Executor {
 
   SportWire& wire_;
   double period_;
+  int action_;
+  bool acts_ = false;  // the action was told, and not released
   LowCommandFrame frame_{};
   VelocityCommand sent_;
   SafetyState state_ = SafetyState::kOffline;

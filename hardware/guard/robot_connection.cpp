@@ -7,6 +7,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/hardware/executors/arm_action.h"
 #include "duet/hardware/executors/homie_executor.h"
 #include "duet/robots/human_body.h"
 #include "duet/robots/yaml_schema.h"
@@ -67,6 +68,20 @@ void read_executor(const YamlSection& top, RobotConfig& config) {
   config.odometry = config.twin ? OdometrySource::kTwin : OdometrySource::kNone;
   read_optional(top, {.name = "executor", .choices = names(kExecutorNames)}, config.executor);
   read_optional(top, {.name = "odometry", .choices = names(kOdometryNames)}, config.odometry);
+  read_optional(top, {"arm_action"}, config.arm_action);
+  const bool acts = config.executor == ExecutorKind::kVendorArmAction;
+  if (acts != !config.arm_action.empty())
+    top.fail(top.line(acts ? "executor" : "arm_action"),
+             "expected executor 'vendor-arm-action' and the name of an 'arm_action', or neither, found one of them");
+  if (!acts) return;
+  try {
+    (void)arm_preset(config.arm_action);
+  } catch (const std::invalid_argument& error) {
+    top.fail(top.line("arm_action"), error.what());
+  }
+  if (config.person)
+    top.fail(top.line("executor"),
+             "the maker's arm actions pass no limit of this program: expected 'person: false', found true");
 }
 
 const Schema<LcmPlace>& lcm_schema() {
@@ -102,7 +117,7 @@ void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& c
 RobotConfig parse_robot_config(const std::string& text, const std::string& file) {
   const YamlSection top(file, parse_yaml(text, file), "robot",
                         {"schema", "robot", "interface", "domain", "mode_machine", "allow_motion", "twin", "person",
-                         "limits", "touches", "contact_limits", "executor", "odometry", "lcm", "camera"});
+                         "limits", "touches", "contact_limits", "executor", "odometry", "arm_action", "lcm", "camera"});
   top.require_schema(kRobotSchema);
   RobotConfig config;
   config.permission = {.allow_motion = false,
@@ -134,8 +149,9 @@ GuardSetup guard_setup(const RobotConfig& config, bool dry_run) {
   LimiterSetup& limiter = setup.limiter;
   limiter.robot = load_shared_robot();
   limiter.limits = config.limits;
-  for (const std::vector<int>& arm : limiter.robot->roles.arms)
-    limiter.executed.joints.insert(limiter.executed.joints.end(), arm.begin(), arm.end());
+  if (config.executor != ExecutorKind::kVendorArmAction)
+    for (const std::vector<int>& arm : limiter.robot->roles.arms)
+      limiter.executed.joints.insert(limiter.executed.joints.end(), arm.begin(), arm.end());
   limiter.executed.kp.setConstant(limiter.robot->dof(), kArmStiffness);
   limiter.executed.kd.setConstant(limiter.robot->dof(), kArmDamping);
   if (config.executor == ExecutorKind::kHomieLcm) {
@@ -153,7 +169,7 @@ GuardSetup guard_setup(const RobotConfig& config, bool dry_run) {
   setup.has_battery = true;
   setup.executor = config.executor;
   setup.odometry = config.odometry;
-  const bool answers = config.executor == ExecutorKind::kHomieLcm || config.executor == ExecutorKind::kSport;
+  const bool answers = config.executor == ExecutorKind::kHomieLcm || is_makers(config.executor);
   setup.rules.executor_answers = !dry_run && answers;
   return setup;
 }

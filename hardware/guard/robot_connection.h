@@ -75,6 +75,7 @@ struct RobotConfig {
   std::string contact_limits;  // path of the table; empty: the one that ships
   ExecutorKind executor = ExecutorKind::kTwin;
   OdometrySource odometry = OdometrySource::kTwin;
+  std::string arm_action;  // of the maker, by its name; empty: the executor has none
   LcmPlace lcm;        // of HOMIE's processes
   CameraMount camera;  // what a person's joints come in
   bool has_camera = false;

@@ -77,7 +77,8 @@ constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_file
                                {"forward", control_info, named_control, no_files, kScripted},
                                {"patient", control_info, named_control, no_files, kScripted},
                                {"mirror", control_info, named_control, no_files, kScripted},
-                               {"waiting", control_info, named_control, no_files, kScripted}};
+                               {"waiting", control_info, named_control, no_files, kScripted},
+                               {"vendor", control_info, named_control, no_files, kScripted}};
 
 // A name that is the path of a policy descriptor.
 constexpr Entry kDescriptor = {"", external_info, external_maker, external_files};

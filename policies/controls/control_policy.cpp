@@ -14,7 +14,7 @@
 namespace duet {
 namespace {
 
-using ControlArray = std::array<ControlScript, 9>;
+using ControlArray = std::array<ControlScript, 10>;
 constexpr ControlArray kControls = {
     {{.name = "omni",
       .about = "Blind to the command: a hand at the partner's nearest hand, and all gestures in rounds",
@@ -45,7 +45,12 @@ constexpr ControlArray kControls = {
      {.name = "waiting",
       .about = "Told the task: its fixed gesture once the partner begins, at once where told to be first",
       .waits = true,
-      .told = true}}};
+      .told = true},
+     {.name = "vendor",
+      .about = "Told the task: stands, its arms do a preset action by the clock, as a maker's own; looks at nobody",
+      .once = true,
+      .told = true,
+      .preset = true}}};
 
 const ControlScript& control_named(std::string_view name) {
   const auto found = std::ranges::find(kControls, name, &ControlScript::name);
@@ -76,6 +81,25 @@ ControlScript waiting_script(Task task) {
   return script;
 }
 
+// The script of `vendor`: an arm action for each task that the maker of the G1 has one for. The motions are ours; the
+// maker's own are not published. There is none for a bow.
+ControlScript preset_script(Task task) {
+  const std::string_view name = to_string(task);
+  ControlGesture gesture = ControlGesture::kNone;
+  if (name == "hug") gesture = ControlGesture::kHug;
+  if (name == "handshake") gesture = ControlGesture::kShake;
+  if (name == "high_five") gesture = ControlGesture::kHighFive;
+  if (name == "wave") gesture = ControlGesture::kWave;
+  if (name == "fly_kiss") gesture = ControlGesture::kKiss;
+  return {.gesture = gesture, .once = true, .preset = true};
+}
+
+ControlScript script_of(const ControlScript& declared, Task task) {
+  if (!declared.told) return declared;
+  if (declared.preset) return preset_script(task);
+  return declared.waits ? waiting_script(task) : told_script(task);
+}
+
 // One round of `omni`: it bows, from here on it kisses, waves, waves from nearer, begins anew. [s]
 struct Round {
   double kiss, wave, near, end;
@@ -90,6 +114,9 @@ constexpr double kTurn = 0.7;                      // [rad/s]
 constexpr double kWaist = 0.5, kPitch = 0.35;      // of a bow [rad]
 constexpr double kWaveRate = 1.5;                  // [Hz]
 constexpr int kPlanned = 100;                      // ticks
+// Of a preset action: until its arms are where they act, that they are held there at most, that a wave lasts [s]; how
+// often hands are shaken [Hz].
+constexpr double kPresetUp = 0.8, kPresetHeld = 20.0, kPresetWave = 5.0, kShakeRate = 1.5;
 
 double smooth(double x) {
   x = std::clamp(x, 0.0, 1.0);
@@ -136,6 +163,8 @@ ControlPolicy::ControlPolicy(std::shared_ptr<const RobotModel> robot, const Cont
   poses_.raised = arms_.reached(1, right + arm * Eigen::Vector3d(0.55, -0.15, 0.55));
   poses_.wave_out = arms_.reached(1, right + arm * Eigen::Vector3d(0.40, -0.50, 0.50));
   poses_.wave_in = arms_.reached(1, right + arm * Eigen::Vector3d(0.45, 0.10, 0.50));
+  poses_.offered = arms_.reached(1, right + arm * Eigen::Vector3d(0.75, 0.15, -0.30));
+  poses_.shaken = arms_.reached(1, right + arm * Eigen::Vector3d(0.75, 0.15, -0.20));
   poses_.mouth = arms_.reached(1, head + arm * Eigen::Vector3d(0.30, -0.10, -0.05));
   poses_.blown = arms_.reached(1, right + arm * Eigen::Vector3d(0.85, 0.05, 0.15));
   reset({});
@@ -143,12 +172,12 @@ ControlPolicy::ControlPolicy(std::shared_ptr<const RobotModel> robot, const Cont
 
 void ControlPolicy::reset(const EpisodeContext& context) {
   start_ = robot_->standing_state(context.start.X_WB);
-  now_ = !script_.told ? script_ : script_.waits ? waiting_script(context.task) : told_script(context.task);
+  now_ = script_of(script_, context.task);
   followed_ = robot_->neutral;
   partner_.reset();
   const bool first = now_.gesture != ControlGesture::kNone && is_leading(context.prompt);
   awake_ = !now_.waits || first;
-  now_.once = now_.once && !first;
+  now_.once = now_.once && (!first || now_.preset);
   least_lean_ = std::numeric_limits<double>::infinity();
   begun_ = closing_ = 0.0;
   served_ = 1.0;
@@ -258,9 +287,11 @@ Eigen::VectorXd ControlPolicy::pose(double seconds) const {
   if (now_.follows >= 0 && awake_) copy_arm(now_.follows, followed_, served_, q);
   if (now_.mirrors)
     for (const int side : {0, 1}) copy_arm(side, followed_, 1.0, q);
+  if (now_.preset) act_preset(seconds, q);
   const bool in_kiss = now_.all_gestures && round >= kRound.kiss && round < kRound.wave;
   const bool kisses = (now_.gesture == ControlGesture::kKiss && awake_) || in_kiss;
-  const bool waves = (now_.gesture == ControlGesture::kWave && awake_) || (now_.all_gestures && round >= kRound.wave);
+  const bool waves = (now_.gesture == ControlGesture::kWave && awake_ && !now_.preset) ||
+                     (now_.all_gestures && round >= kRound.wave);
   if (kisses) {
     const double t = now_.all_gestures ? round - kRound.kiss : gesture_time(seconds);
     const double up = smooth(t / 0.5) * (now_.all_gestures ? 1.0 : 1.0 - smooth((t - 2.4) / 0.6));
@@ -280,6 +311,36 @@ Eigen::VectorXd ControlPolicy::pose(double seconds) const {
   }
   for (int j = 0; j < robot_->dof(); ++j) q[j] = std::clamp(q[j], robot_->joints[j].lower, robot_->joints[j].upper);
   return q;
+}
+
+void ControlPolicy::act_preset(double seconds, Eigen::VectorXd& q) const {
+  const double t = gesture_time(seconds), up = smooth(t / kPresetUp);
+  const double held = up * (1.0 - smooth((t - kPresetHeld) / kPresetUp));
+  const auto swing = [&](double rate) { return 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * rate * t); };  // 0 to 1
+  Eigen::VectorXd arms = robot_->neutral;
+  switch (now_.gesture) {
+    case ControlGesture::kShake:
+      copy_arm(1, poses_.offered, 1.0, arms);
+      copy_arm(1, poses_.shaken, swing(kShakeRate), arms);
+      return copy_arm(1, arms, held, q);
+    case ControlGesture::kHighFive:
+      return copy_arm(1, poses_.raised, held, q);
+    case ControlGesture::kHug:
+      for (const int side : {0, 1}) {
+        copy_arm(side, poses_.open[side], 1.0, arms);
+        copy_arm(side, poses_.closed[side], smooth((t - 2.0 * kPresetUp) / kPresetUp), arms);
+        copy_arm(side, arms, held, q);
+      }
+      return;
+    case ControlGesture::kWave:
+      copy_arm(1, poses_.wave_out, 1.0, arms);
+      copy_arm(1, poses_.wave_in, swing(kWaveRate), arms);
+      return copy_arm(1, arms, up * (1.0 - smooth((t - kPresetWave) / kPresetUp)), q);
+    case ControlGesture::kNone:
+    case ControlGesture::kBow:
+    case ControlGesture::kKiss:  // as every control's, once
+      return;
+  }
 }
 
 Reference ControlPolicy::reference(const Place& place, double seconds, double ahead) const {

@@ -16,7 +16,7 @@
 namespace duet {
 
 // The parts of which a control is made.
-enum class ControlGesture { kNone, kBow, kWave, kKiss };
+enum class ControlGesture { kNone, kBow, kWave, kKiss, kShake, kHighFive, kHug };
 
 struct ControlScript {
   std::string_view name = {}, about = {};
@@ -34,9 +34,10 @@ struct ControlScript {
   bool mirrors = false;                            // both arms and the trunk do as the partner's
   bool told = false;                               // does what its task's row in the source says
   bool averages = false;  // takes the partner where the last kHistoryFrames have them on average
+  bool preset = false;  // by the clock alone, as a maker's arm action: a wave and a kiss end, what touches is held 20 s
 };
 
-// `omni`, `canned`, `servo`, `raised`, `walker`, `forward`, `patient`, `mirror`, `waiting`.
+// `omni`, `canned`, `servo`, `raised`, `walker`, `forward`, `patient`, `mirror`, `waiting`, `vendor`.
 std::span<const ControlScript> control_scripts();
 
 // Whether a policy of that name is one of them.
@@ -68,11 +69,13 @@ class ControlPolicy final : public Policy {
   struct Poses {
     std::array<Eigen::VectorXd, 2> forward;
     std::array<Eigen::VectorXd, 2> open, closed;
-    Eigen::VectorXd raised, wave_out, wave_in, mouth, blown;
+    Eigen::VectorXd raised, wave_out, wave_in, mouth, blown, offered, shaken;
   };
 
   [[nodiscard]] static Place place(const ObservationFrame& frame);
   [[nodiscard]] Eigen::VectorXd pose(double seconds) const;
+  // Arms of a preset action, into `q`.
+  void act_preset(double seconds, Eigen::VectorXd& q) const;
   [[nodiscard]] double gesture_time(double seconds) const;  // since its begin [s]
   [[nodiscard]] double bow(double seconds) const;           // 0 upright to 1
   [[nodiscard]] Reference reference(const Place& place, double seconds, double ahead) const;

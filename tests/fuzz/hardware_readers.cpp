@@ -140,7 +140,7 @@ std::string sport_sample(unsigned seed) {
 
 void read_sport(std::string_view bytes) {
   const bool order = order_of(ServiceCall::kSetVelocity, bytes).has_value();
-  refuse_unless(order || fsm_of(bytes).has_value());
+  refuse_unless(order || fsm_of(bytes).has_value() || name_of(bytes).has_value());
 }
 
 std::string config_sample(unsigned seed) {

@@ -233,6 +233,7 @@ void expect_to_start_as_printed(const std::string& example) {
 
 TEST(ProcessDeath, TheExampleOfHomieStartsAsPrinted) { expect_to_start_as_printed("homie.yaml"); }
 TEST(ProcessDeath, TheExampleOfTheMakersServiceStartsAsPrinted) { expect_to_start_as_printed("sport.yaml"); }
+TEST(ProcessDeath, TheExampleOfTheMakersArmActionStartsAsPrinted) { expect_to_start_as_printed("vendor_arm.yaml"); }
 
 TEST(ProcessDeath, ATwinRunsThroughTheMakersServiceAndHoldsWhenItDies) {
   try_until("executor_age",

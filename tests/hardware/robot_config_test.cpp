@@ -75,7 +75,7 @@ TEST(RobotConfig, ARobotHasNoOdometryUntilItIsNamed) {
 }
 
 TEST(RobotConfig, OfTheExamplesAreTwins) {
-  for (const char* name : {"homie", "sport", "camera", "lowcmd"}) {
+  for (const char* name : {"homie", "sport", "camera", "lowcmd", "vendor_arm"}) {
     const RobotConfig config = read_robot_config(std::string(DUET_SOURCE_DIR) + "/examples/hardware/" + name + ".yaml");
     EXPECT_TRUE(config.twin) << name;
     EXPECT_EQ(executor_refusal(config.executor, config.odometry, true), "") << name;
@@ -89,13 +89,30 @@ std::string refusal_of_more(const std::string& more) {
 TEST(RobotConfig, NamesWhatIsWrongWithExecutorAndCamera) {
   EXPECT_SENTENCE(refusal("domain: 150", "domain: 150.5"));
   EXPECT_SENTENCE(refusal("mode_machine: 5", "mode_machine: 1e300"));
-  for (const char* text : {"executor: homie\n", "odometry: gps\n", "lcm: {port: 70000}\n", "lcm: {hops: 0.5}\n",
+  for (const char* text : {"executor: vendor-arm-action\n", "arm_action: hug\n",
+                           "executor: vendor-arm-action\narm_action: hugs\n", "executor: homie\n", "odometry: gps\n", "lcm: {port: 70000}\n", "lcm: {hops: 0.5}\n",
                            "camera: {position: [0, 0, 3], quat_wxyz: [1, 0, 0, 0]}\n",
                            "camera: {position: [0, 0, 1], quat_wxyz: [1, 0, 0]}\n",
                            "camera: {position: [0, 0, 1], quat_wxyz: [1, 1, 0, 0]}\n",
                            "camera: {position: [0, 0, 1], quat_wxyz: [1, x, 0, 0]}\n",
                            "camera: {position: [0, 0, 1], quat_wxyz: [.nan, 0, 0, 0]}\n"})
     EXPECT_SENTENCE(refusal_of_more(text));
+}
+
+// The maker's arm actions pass no limiter: nobody may be near, and no joint counts as executed.
+TEST(RobotConfig, AnArmActionIsAloneAndExecutesNoJoint) {
+  const RobotConfig config =
+      parse_robot_config(kTwin + std::string("executor: vendor-arm-action\narm_action: shake hand\n"), "twin.yaml");
+  const GuardSetup setup = guard_setup(config, false);
+  EXPECT_TRUE(setup.limiter.executed.joints.empty());
+  EXPECT_TRUE(setup.rules.executor_answers);
+  const ExecutedChannels channels =
+      executed_channels(config.executor, *setup.limiter.robot, setup.limiter.executed.joints);
+  EXPECT_EQ(std::ranges::count(channels.executed, true), 4);
+  EXPECT_SENTENCE(executed_channels_text(channels, *setup.limiter.robot));
+  std::string near = kTwin + std::string("executor: vendor-arm-action\narm_action: shake hand\n");
+  near.replace(near.find("person: false"), 13, "person: true");
+  EXPECT_SENTENCE(test::thrown_message<InputError>([&] { (void)parse_robot_config(near, "twin.yaml"); }));
 }
 
 TEST(RobotConfig, NamesWhatIsWrong) {

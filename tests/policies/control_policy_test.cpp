@@ -89,6 +89,42 @@ TEST(ControlPolicy, AllButThoseThatAreToldAreBlindToTheCommand) {
   }
 }
 
+// A maker's arm action looks at nobody, begins at once, is held where hands touch, and ends by itself.
+TEST(ControlPolicy, VendorsArmsGoByTheClockAlone) {
+  const auto robot = g1();
+  const ObservationFrame here = facing(*robot, 1.2, {0.8, 0.1, 1.0}), there = facing(*robot, 2.5, {2.5, 0.3, 1.6});
+  const Reference rest{here.robot.X_WB, robot->neutral};
+  const auto right = [&](Task task, int tick) {
+    return hand_of(*robot, planned("vendor", task, here, tick).front(), "rhand");
+  };
+  const Eigen::Vector3d hanging = hand_of(*robot, rest, "rhand");
+  for (const Task task : all_tasks()) {
+    for (const int tick : {0, 30, 150, 600}) {
+      const std::vector<Reference> a = planned("vendor", task, here, tick), b = planned("vendor", task, there, tick);
+      for (std::size_t k = 0; k < a.size(); ++k) ASSERT_EQ(a[k].q, b[k].q) << to_string(task) << tick;
+      EXPECT_EQ(a.back().X_WB.p, here.robot.X_WB.p) << "it stands";
+    }
+    EXPECT_LT((right(task, 1100) - hanging).norm(), 1e-6) << to_string(task);
+    const double moved = (right(task, 60) - hanging).norm();
+    EXPECT_EQ(moved > 0.2, task != Task::kBend) << to_string(task) << ": the maker has no bow";
+  }
+  EXPECT_GT((right(Task::kHandshake, 900) - hanging).norm(), 0.2);
+  EXPECT_LT((right(Task::kWave, 320) - hanging).norm(), 1e-6);
+  EXPECT_GT(std::abs(right(Task::kHandshake, 150).z() - right(Task::kHandshake, 166).z()), 0.02) << "it shakes";
+  const auto apart = [&](int tick) {
+    const Reference hug = planned("vendor", Task::kHug, here, tick).front();
+    return (hand_of(*robot, hug, "lhand") - hand_of(*robot, hug, "rhand")).norm();
+  };
+  EXPECT_GT(apart(60), apart(140) + 0.2) << "its arms close";
+  // A command to be first changes nothing: it always is.
+  EpisodeContext leading{.task = Task::kHandshake, .prompt = leading_prompt(task_prompt(Task::kHandshake))};
+  leading.start = here.robot;
+  const std::unique_ptr<Policy> first = control_maker("vendor", robot)();
+  first->reset(leading);
+  const std::vector<Reference> plan = first->plan({.history = std::span(&here, 1), .tick = 300});
+  EXPECT_EQ(plan.front().q, planned("vendor", Task::kHandshake, here, 300).front().q);
+}
+
 TEST(ControlPolicy, AFollowingHandComesToThePartners) {
   const auto robot = g1();
   const Eigen::Vector3d hand(0.35, -0.1, 0.95);  // within reach
