@@ -152,8 +152,8 @@ std::string dds_type_digest(const std::string& type) {
         &unitree_hg_msg_dds__MotorState__desc, &unitree_hg_msg_dds__LowState__desc, &unitree_go_msg_dds__IMUState__desc,
         &unitree_go_msg_dds__PathPoint__desc, &unitree_go_msg_dds__TimeSpec__desc,
         &unitree_go_msg_dds__SportModeState__desc, &unitree_go_msg_dds__WirelessController__desc,
-        &unitree_hg_msg_dds__BmsState__desc,
-        &unitree_api_msg_dds__Request__desc, &unitree_api_msg_dds__Response__desc}) {
+        &unitree_hg_msg_dds__BmsState__desc, &unitree_api_msg_dds__Request__desc,
+        &unitree_api_msg_dds__Response__desc}) {
     if (type != known->m_typename) continue;
     Sha256 digest;
     digest.update(std::as_bytes(std::span(known->type_information.data, known->type_information.sz)));
@@ -229,9 +229,9 @@ class DdsSportWire final : public SportWire {
     dds_entity_t requests = 0, responses = 0;
   };
   Calls open(Service service) {
-    return {participant_.writer(unitree_api_msg_dds__Request__desc, topic_of(service, "request").c_str(), kCallsKept),
-            participant_.reader(unitree_api_msg_dds__Response__desc, topic_of(service, "response").c_str(),
-                                kCallsKept)};
+    return {
+        participant_.writer(unitree_api_msg_dds__Request__desc, topic_of(service, "request").c_str(), kCallsKept),
+        participant_.reader(unitree_api_msg_dds__Response__desc, topic_of(service, "response").c_str(), kCallsKept)};
   }
   static bool take(const Calls& calls, RpcResponse& response) {
     const Loan<ResponseSample> loan(calls.responses);
@@ -257,10 +257,10 @@ class DdsServices final : public ServicesWire {
       : participant_(place), arms_(participant_.reader(unitree_hg_msg_dds__LowCmd__desc, kArmTopic)) {
     for (const Service service : services) {
       Calls& calls = of(service);
-      calls.requests = participant_.reader(unitree_api_msg_dds__Request__desc, topic_of(service, "request").c_str(),
-                                           kCallsKept);
-      calls.responses = participant_.writer(unitree_api_msg_dds__Response__desc, topic_of(service, "response").c_str(),
-                                            kCallsKept);
+      calls.requests =
+          participant_.reader(unitree_api_msg_dds__Request__desc, topic_of(service, "request").c_str(), kCallsKept);
+      calls.responses =
+          participant_.writer(unitree_api_msg_dds__Response__desc, topic_of(service, "response").c_str(), kCallsKept);
     }
   }
 

@@ -21,8 +21,8 @@ namespace {
 
 using namespace duet;  // a program of its own
 
-constexpr int kPeriodUs = 5000;  // of its commands, as HOMIE's controller has it
-constexpr int kPolicyEvery = 4;  // of these periods, as its policy has it
+constexpr int kPeriodUs = 5000;            // of its commands, as HOMIE's controller has it
+constexpr int kPolicyEvery = 4;            // of these periods, as its policy has it
 constexpr const char* kMakersMode = "ai";  // in which a G1 walks
 constexpr Service kSwitched[] = {Service::kMotionSwitcher};
 volatile std::sig_atomic_t services_stopped = 0;
@@ -88,8 +88,7 @@ void every_period(const ServicesArguments& arguments, const Step& step) {
 
 void answer_switcher(ServicesWire& wire, FakeSwitcher& switcher) {
   RpcRequest request;
-  while (wire.take(Service::kMotionSwitcher, request))
-    wire.respond(Service::kMotionSwitcher, switcher.answer(request));
+  while (wire.take(Service::kMotionSwitcher, request)) wire.respond(Service::kMotionSwitcher, switcher.answer(request));
 }
 
 void play_switcher(const ServicesArguments& arguments) {

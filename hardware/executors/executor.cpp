@@ -58,7 +58,8 @@ ExecutedChannels executed_channels(ExecutorKind kind, const RobotModel& robot, c
       break;
     case ExecutorKind::kVendorArmAction:
       channels.joints.clear();
-      channels.legs = "by the maker's walking, arms by its preset action, which no limit here reaches: this is not HOMIE";
+      channels.legs =
+          "by the maker's walking, arms by its preset action, which no limit here reaches: this is not HOMIE";
       channels.stop = "asks the maker's services to release the arms and to damp";
       break;
   }
@@ -82,9 +83,10 @@ nlohmann::json executed_channels_json(const ExecutedChannels& channels, const Ro
 
 std::string executed_channels_text(const ExecutedChannels& channels, const RobotModel& robot) {
   return fmt::format(
-      "executor '{}' is told the velocity of the root{} and the joints {}; it is not told roll and pitch of the root "
+      "executor '{}' is told the velocity of the root{} and {}; it is not told roll and pitch of the root "
       "nor {}: legs {}. Damping {}.",
-      executor_name(channels.kind), channels.height ? ", its height" : "", joint_names(channels.joints, robot, true),
+      executor_name(channels.kind), channels.height ? ", its height" : "",
+      channels.joints.empty() ? "no joint" : "the joints " + joint_names(channels.joints, robot, true),
       joint_names(channels.joints, robot, false), channels.legs, channels.stop);
 }
 
@@ -124,7 +126,8 @@ std::string permission_refusal(const ArmingFacts& facts) {
   if (permission.interface.empty() || permission.interface == "auto")
     return fmt::format("the configuration has to name a network interface, found '{}'", permission.interface);
   if (permission.domain < 0) return "the configuration names no domain of DDS";
-  const bool of_twins = permission.domain >= kFirstTwinDomain || is_twin_place({permission.domain, permission.interface});
+  const bool of_twins =
+      permission.domain >= kFirstTwinDomain || is_twin_place({permission.domain, permission.interface});
   if (facts.twin != of_twins)
     return fmt::format("domain {}: a twin has 100 to 199, or 1 on 'lo', and a robot has none of these",
                        permission.domain);

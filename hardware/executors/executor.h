@@ -16,10 +16,10 @@
 namespace duet {
 
 enum class ExecutorKind {
-  kTwin,      // the guard's own frames to a twin
-  kHomieLcm,  // HOMIE's processes, over LCM
-  kSport,     // the maker's walking, over DDS: not HOMIE
-  kLowcmd,    // the guard's own frames to a robot; a walking controller in the guard keeps it on its feet
+  kTwin,             // the guard's own frames to a twin
+  kHomieLcm,         // HOMIE's processes, over LCM
+  kSport,            // the maker's walking, over DDS: not HOMIE
+  kLowcmd,           // the guard's own frames to a robot; a walking controller in the guard keeps it on its feet
   kVendorArmAction,  // the maker's walking and one of its preset arm actions, which nothing here limits
 };
 inline constexpr std::array<std::string_view, 5> kExecutorNames = {"twin", "homie-lcm", "sport", "lowcmd",

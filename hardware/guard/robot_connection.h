@@ -76,8 +76,8 @@ struct RobotConfig {
   ExecutorKind executor = ExecutorKind::kTwin;
   OdometrySource odometry = OdometrySource::kTwin;
   std::string arm_action;  // of the maker, by its name; empty: the executor has none
-  LcmPlace lcm;        // of HOMIE's processes
-  CameraMount camera;  // what a person's joints come in
+  LcmPlace lcm;            // of HOMIE's processes
+  CameraMount camera;      // what a person's joints come in
   bool has_camera = false;
 
   [[nodiscard]] DdsPlace place() const { return {permission.domain, permission.interface}; }

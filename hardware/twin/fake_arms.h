@@ -1,6 +1,6 @@
-// A stand-in for the maker's arm actions, for tests and for `duet-g1-services`: numbers in, frames of the arm topic out.
-// The motions are ours (those of the control `vendor`), not the maker's. A pure function of what it is given. One owner,
-// one thread.
+// A stand-in for the maker's arm actions, for tests and for `duet-g1-services`: numbers in, frames of the arm topic
+// out. The motions are ours (those of the control `vendor`), not the maker's. A pure function of what it is given. One
+// owner, one thread.
 #pragma once
 
 #include <memory>

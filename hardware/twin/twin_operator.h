@@ -1,8 +1,8 @@
 // The operator of a demonstration: holds the dead-man switch, stands the twin up once it is damped, lets it down from
 // its rope once its motors hold it and its arms have come to rest, and asks it to run, again and again, also after a
-// hold. Where other programs hold the motors before anybody damped them (HOMIE's, the maker's), nothing at the twin shows
-// when the guard is armed: start and A are pressed in turn. A robot that was let down once stays down: damped or limp,
-// it falls. One owner, one thread.
+// hold. Where other programs hold the motors before anybody damped them (HOMIE's, the maker's), nothing at the twin
+// shows when the guard is armed: start and A are pressed in turn. A robot that was let down once stays down: damped or
+// limp, it falls. One owner, one thread.
 #pragma once
 
 #include <array>

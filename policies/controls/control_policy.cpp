@@ -290,8 +290,8 @@ Eigen::VectorXd ControlPolicy::pose(double seconds) const {
   if (now_.preset) act_preset(seconds, q);
   const bool in_kiss = now_.all_gestures && round >= kRound.kiss && round < kRound.wave;
   const bool kisses = (now_.gesture == ControlGesture::kKiss && awake_) || in_kiss;
-  const bool waves = (now_.gesture == ControlGesture::kWave && awake_ && !now_.preset) ||
-                     (now_.all_gestures && round >= kRound.wave);
+  const bool waves =
+      (now_.gesture == ControlGesture::kWave && awake_ && !now_.preset) || (now_.all_gestures && round >= kRound.wave);
   if (kisses) {
     const double t = now_.all_gestures ? round - kRound.kiss : gesture_time(seconds);
     const double up = smooth(t / 0.5) * (now_.all_gestures ? 1.0 : 1.0 - smooth((t - 2.4) / 0.6));

@@ -40,9 +40,8 @@ struct ArmedTrial {
                "schema: duet.robot/1\nrobot: twin\ntwin: true\ninterface: lo\nallow_motion: true\nperson: false\n"
                "mode_machine: 5\ndomain: " +
                    domain_text() + "\n" + more);
-    twin = std::make_unique<OwnProcess>(
-        std::vector<std::string>{DUET_TWIN, "--operated", "--seconds", "60", "--domain", domain_text(),
-                                 "--velocity-port", death_port()});
+    twin = std::make_unique<OwnProcess>(std::vector<std::string>{DUET_TWIN, "--operated", "--seconds", "60", "--domain",
+                                                                 domain_text(), "--velocity-port", death_port()});
     if (!services.empty()) {
       std::vector<std::string> all = {DUET_SERVICES,     "--seconds",  "60",         "--domain",  domain_text(),
                                       "--velocity-port", death_port(), "--lcm-port", death_port()};
@@ -176,17 +175,14 @@ std::vector<std::string> printed_lines(const std::string& file, const std::strin
 
 // The programs of a printed line, as they are built here, in a domain and at a port that others hardly have.
 std::vector<std::string> words_of(const std::string& line, const test::ScratchFolder& folder) {
-  const std::map<std::string, std::string> here = {{"duet", DUET_PROGRAM},
-                                                   {"duet-g1-twin", DUET_TWIN},
-                                                   {"duet-g1-services", DUET_SERVICES},
-                                                   {"150", domain_text()},
-                                                   {"15001", death_port()},
-                                                   {"run.mcap", folder / "run.mcap"}};
+  const std::map<std::string, std::string> here = {
+      {"duet", DUET_PROGRAM}, {"duet-g1-twin", DUET_TWIN}, {"duet-g1-services", DUET_SERVICES},
+      {"150", domain_text()}, {"15001", death_port()},     {"run.mcap", folder / "run.mcap"}};
   std::vector<std::string> words;
   std::istringstream text(line);
   for (std::string word; text >> word;) {
     const auto found = here.find(word);
-    words.push_back(found != here.end()                    ? found->second
+    words.push_back(found != here.end()                     ? found->second
                     : word.starts_with("examples/hardware") ? folder / "example.yaml"
                                                             : word);
   }

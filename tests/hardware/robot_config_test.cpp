@@ -89,13 +89,14 @@ std::string refusal_of_more(const std::string& more) {
 TEST(RobotConfig, NamesWhatIsWrongWithExecutorAndCamera) {
   EXPECT_SENTENCE(refusal("domain: 150", "domain: 150.5"));
   EXPECT_SENTENCE(refusal("mode_machine: 5", "mode_machine: 1e300"));
-  for (const char* text : {"executor: vendor-arm-action\n", "arm_action: hug\n",
-                           "executor: vendor-arm-action\narm_action: hugs\n", "executor: homie\n", "odometry: gps\n", "lcm: {port: 70000}\n", "lcm: {hops: 0.5}\n",
-                           "camera: {position: [0, 0, 3], quat_wxyz: [1, 0, 0, 0]}\n",
-                           "camera: {position: [0, 0, 1], quat_wxyz: [1, 0, 0]}\n",
-                           "camera: {position: [0, 0, 1], quat_wxyz: [1, 1, 0, 0]}\n",
-                           "camera: {position: [0, 0, 1], quat_wxyz: [1, x, 0, 0]}\n",
-                           "camera: {position: [0, 0, 1], quat_wxyz: [.nan, 0, 0, 0]}\n"})
+  for (const char* text :
+       {"executor: vendor-arm-action\n", "arm_action: hug\n", "executor: vendor-arm-action\narm_action: hugs\n",
+        "executor: homie\n", "odometry: gps\n", "lcm: {port: 70000}\n", "lcm: {hops: 0.5}\n",
+        "camera: {position: [0, 0, 3], quat_wxyz: [1, 0, 0, 0]}\n",
+        "camera: {position: [0, 0, 1], quat_wxyz: [1, 0, 0]}\n",
+        "camera: {position: [0, 0, 1], quat_wxyz: [1, 1, 0, 0]}\n",
+        "camera: {position: [0, 0, 1], quat_wxyz: [1, x, 0, 0]}\n",
+        "camera: {position: [0, 0, 1], quat_wxyz: [.nan, 0, 0, 0]}\n"})
     EXPECT_SENTENCE(refusal_of_more(text));
 }
 

@@ -32,9 +32,8 @@ void expect_a_g1(const std::string& multicast) {
   if (const ShellAnswer possible = alone(multicast, "true"); possible.code != 0)
     GTEST_SKIP() << "not run: no network of its own can be made here: " << possible.out;
   const std::string places = " --domain 1 --seconds 20 >/dev/null & ";
-  const ShellAnswer answer =
-      alone(multicast, DUET_TWIN " --operated" + places + DUET_SERVICES " --switcher" + places + "sleep 1; " +
-                           DUET_SDK_CLIENT " 1 4");
+  const ShellAnswer answer = alone(multicast, DUET_TWIN " --operated" + places + DUET_SERVICES " --switcher" + places +
+                                                  "sleep 1; " + DUET_SDK_CLIENT " 1 4");
   EXPECT_NE(answer.out.find("states many\nelbow 0.50\nvolts 48, winding 40\n"), std::string::npos) << answer.out;
   EXPECT_NE(answer.out.find("remote heard, keys 1\n"), std::string::npos) << answer.out;  // R1
   EXPECT_NE(answer.out.find("secondary imu many, norm 1.000\n"), std::string::npos) << answer.out;

@@ -57,9 +57,9 @@ TEST(ToVector, IsTheSameForBothSignsOfAQuaternion) {
 }
 
 TEST(MakePolicy, KnowsItsNamesAndRefusesOthers) {
-  EXPECT_EQ(policy_names(),
-            (std::vector<std::string>{"replay", "replay_dense", "null", "dstar", "dp", "retrieval", "omni", "canned",
-                                      "servo", "raised", "walker", "forward", "patient", "mirror", "waiting", "vendor"}));
+  EXPECT_EQ(policy_names(), (std::vector<std::string>{"replay", "replay_dense", "null", "dstar", "dp", "retrieval",
+                                                      "omni", "canned", "servo", "raised", "walker", "forward",
+                                                      "patient", "mirror", "waiting", "vendor"}));
   for (const std::string name : {"replay", "replay_dense", "null"}) EXPECT_EQ(make_policy(name, g1())->name(), name);
   EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { make_policy("nul", g1()); }));
   EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { make_policy("null", nullptr); }));
