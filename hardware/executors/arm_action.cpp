@@ -1,7 +1,5 @@
 #include "duet/hardware/executors/arm_action.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <stdexcept>
 #include <vector>
@@ -21,12 +19,6 @@ const ArmPreset& arm_preset(const std::string& name) {
   std::vector<std::string> names;
   for (const ArmPreset& preset : kArmPresets) names.emplace_back(preset.name);
   throw std::invalid_argument(unknown_name_message("arm action", name, names));
-}
-
-RpcRequest action_request(std::int64_t id, int action) {
-  RpcRequest request{.id = id, .call = ServiceCall::kDoArmAction, .parameter = {}};
-  fmt::format_to_n(request.parameter.data(), request.parameter.size() - 1, "{{\"data\":{}}}", action);
-  return request;
 }
 
 }  // namespace duet

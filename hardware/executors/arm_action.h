@@ -9,7 +9,6 @@
 #include <string_view>
 
 #include "duet/core/task.h"
-#include "duet/hardware/executors/sport_executor.h"
 
 namespace duet {
 
@@ -26,7 +25,6 @@ inline constexpr std::array<ArmPreset, 6> kArmPresets = {{{13, "right kiss", Tas
                                                           {25, "face wave", Task::kWave, 5.8},
                                                           {26, "high wave", Task::kWave, 5.8},
                                                           {27, "shake hand", Task::kHandshake, 20.8}}};
-inline constexpr int kReleaseArm = 99;  // ends any
 // Answers of the service other than 0.
 inline constexpr std::int32_t kArmsOccupied = 7400, kArmsHeld = 7401, kUnknownAction = 7402, kNotWalking = 7404;
 
@@ -34,7 +32,5 @@ inline constexpr std::int32_t kArmsOccupied = 7400, kArmsHeld = 7401, kUnknownAc
 const ArmPreset* arm_preset(int id);
 // Throws std::invalid_argument with the known names.
 const ArmPreset& arm_preset(const std::string& name);
-
-RpcRequest action_request(std::int64_t id, int action);
 
 }  // namespace duet

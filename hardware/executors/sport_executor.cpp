@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "duet/hardware/executors/arm_action.h"
 #include "duet/hardware/wire/low_level_frame.h"
 
 namespace duet {
@@ -175,11 +174,19 @@ RpcRequest velocity_request(std::int64_t id, const VelocityCommand& velocity, do
   return request;
 }
 
-RpcRequest fsm_request(std::int64_t id, int fsm) {
-  RpcRequest request{.id = id, .call = ServiceCall::kSetFsm, .parameter = {}};
-  fmt::format_to_n(request.parameter.data(), request.parameter.size() - 1, "{{\"data\":{}}}", fsm);
+namespace {
+
+RpcRequest number_request(std::int64_t id, ServiceCall call, int number) {
+  RpcRequest request{.id = id, .call = call, .parameter = {}};
+  fmt::format_to_n(request.parameter.data(), request.parameter.size() - 1, "{{\"data\":{}}}", number);
   return request;
 }
+
+}  // namespace
+
+RpcRequest fsm_request(std::int64_t id, int fsm) { return number_request(id, ServiceCall::kSetFsm, fsm); }
+
+RpcRequest action_request(std::int64_t id, int action) { return number_request(id, ServiceCall::kDoArmAction, action); }
 
 RpcRequest read_request(std::int64_t id, ServiceCall call) { return {.id = id, .call = call, .parameter = {}}; }
 

@@ -45,6 +45,9 @@ struct RpcRequest {
 RpcRequest velocity_request(std::int64_t id, const VelocityCommand& velocity, double duration);
 RpcRequest fsm_request(std::int64_t id, int fsm);
 RpcRequest read_request(std::int64_t id, ServiceCall call);
+// `action`: a number of hardware/executors/arm_action.h, or kReleaseArm, which ends any.
+inline constexpr int kReleaseArm = 99;
+RpcRequest action_request(std::int64_t id, int action);
 
 struct RpcResponse {
   std::int64_t id = 0, api = 0;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "duet/core/json.h"
 #include "duet/hardware/wire/low_level_frame.h"
 #include "duet/policies/controls/control_policy.h"
 
@@ -21,7 +22,7 @@ constexpr std::int32_t kNoSuchCall = 3203, kBadParameter = 3104;
 std::string list_of_actions() {
   nlohmann::json list = nlohmann::json::array();
   for (const ArmPreset& preset : kArmPresets) list.push_back({{"id", preset.id}, {"name", preset.name}});
-  return list.dump();
+  return dumped(list);
 }
 
 }  // namespace

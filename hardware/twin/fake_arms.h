@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "duet/hardware/executors/arm_action.h"
+#include "duet/hardware/executors/sport_executor.h"
 #include "duet/hardware/twin/fakes.h"
 #include "duet/policies/policy.h"
 

@@ -6,6 +6,7 @@
 #include <deque>
 #include <nlohmann/json.hpp>
 
+#include "duet/hardware/executors/sport_executor.h"
 #include "duet/hardware/twin/fake_arms.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"
