@@ -98,6 +98,8 @@ TEST(ControlPolicy, VendorsArmsGoByTheClockAlone) {
     return hand_of(*robot, planned("vendor", task, here, tick).front(), "rhand");
   };
   const Eigen::Vector3d hanging = hand_of(*robot, rest, "rhand");
+  // Those that the maker has an action for: no bow, no fist bump.
+  const std::set<Task> presets = {Task::kHug, Task::kHandshake, Task::kHighFive, Task::kWave, Task::kFlyKiss};
   for (const Task task : all_tasks()) {
     for (const int tick : {0, 30, 150, 600}) {
       const std::vector<Reference> a = planned("vendor", task, here, tick), b = planned("vendor", task, there, tick);
@@ -106,7 +108,7 @@ TEST(ControlPolicy, VendorsArmsGoByTheClockAlone) {
     }
     EXPECT_LT((right(task, 1100) - hanging).norm(), 1e-6) << to_string(task);
     const double moved = (right(task, 60) - hanging).norm();
-    EXPECT_EQ(moved > 0.2, task != Task::kBend) << to_string(task) << ": the maker has no bow";
+    EXPECT_EQ(moved > 0.2, presets.contains(task)) << to_string(task);
   }
   EXPECT_GT((right(Task::kHandshake, 900) - hanging).norm(), 0.2);
   EXPECT_LT((right(Task::kWave, 320) - hanging).norm(), 1e-6);
