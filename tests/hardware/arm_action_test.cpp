@@ -98,12 +98,16 @@ TEST(FakeArms, ItsTargetsDoNotJump) {
       (void)makers.tell(preset.id);
       LowCommandFrame before = makers.motors;
       for (double time = 0.0; time < 22.0; time += kDt) {
-        if (std::abs(time - released) < 0.5 * kDt) EXPECT_EQ(makers.tell(kReleaseArm), 0);
+        if (std::abs(time - released) < 0.5 * kDt) {
+          EXPECT_EQ(makers.tell(kReleaseArm), 0);
+        }
         makers.step();
         for (int j = 15; j < kG1Motors; ++j)
           ASSERT_LT(std::abs(makers.motors.motor[j].q - before.motor[j].q), 0.3) << preset.name << time << " " << j;
         before = makers.motors;
-        if (time > released + 1.1) ASSERT_LT(makers.moved(), 1e-6) << preset.name;
+        if (time > released + 1.1) {
+          ASSERT_LT(makers.moved(), 1e-6) << preset.name;
+        }
       }
     }
 }
