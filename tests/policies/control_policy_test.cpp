@@ -119,9 +119,8 @@ TEST(ControlPolicy, VendorsArmsGoByTheClockAlone) {
   };
   EXPECT_GT(apart(60), apart(140) + 0.2) << "its arms close";
   // A command to be first changes nothing: it always is.
-  const EpisodeContext leading{.task = Task::kHandshake,
-                               .prompt = leading_prompt(task_prompt(Task::kHandshake)),
-                               .start = here.robot};
+  const EpisodeContext leading{
+      .task = Task::kHandshake, .prompt = leading_prompt(task_prompt(Task::kHandshake)), .start = here.robot};
   const std::unique_ptr<Policy> first = control_maker("vendor", robot)();
   first->reset(leading);
   const std::vector<Reference> plan = first->plan({.history = std::span(&here, 1), .tick = 300});
