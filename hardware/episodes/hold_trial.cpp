@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "duet/core/numbers.h"
 #include "duet/hardware/guard/robot_connection.h"
@@ -21,6 +22,10 @@ constexpr double kPlanPeriod = 0.02;   // [s]
 constexpr double kAskedFor = 2.0;      // after the hold, to run again [s]
 constexpr double kArmSwing = 0.3;      // that the planner asks of both elbows [rad]
 constexpr int kElbow = 3;              // of an arm
+constexpr double kLate = 60.0;         // states, from one moment on [ms]
+constexpr double kDrifts = 3.0;        // a zero of an elbow, until its angle is beyond its limit by [rad/s]
+constexpr double kBeyond = 0.15;       // [rad]
+constexpr float kFarAway = 30000.0f;   // [rad]
 constexpr double kPersonAway = 6.0;    // [m]
 constexpr double kPersonHeight = 1.7;  // [m]
 
@@ -50,6 +55,8 @@ std::vector<TwinFault> faults_of(StopCause cause, double begin, double lasts) {
       return {{TwinFaultKind::kHot, begin, begin + lasts, 125.0}};
     case StopCause::kTilt:
       return {{TwinFaultKind::kTilt, begin, begin + kShort, 0.6}};
+    case StopCause::kStateDelay:
+      return {{TwinFaultKind::kDelay, begin, begin + lasts, kLate}};
     default:
       return {};
   }
@@ -121,6 +128,27 @@ class HoldRun {
     link_.twin().condition.gyro = cause_ == StopCause::kGyro && glitch ? 7.0 : 0.0;
     if (cause_ == StopCause::kLoopLate && !paused_) link_.pause(kGap);
     paused_ = true;
+    trouble.spoil = [this](LowStateFrame& frame) { spoil(frame.motor[robot_->roles.arms[0][kElbow]]); };
+  }
+
+  // What an elbow reports.
+  void spoil(MotorStateFrame& motor) {
+    const bool lasts = time() < begin_ + setup_.seconds;
+    if (lasts && cause_ == StopCause::kJointJump) motor.q = kFarAway;
+    if (lasts && cause_ == StopCause::kJointMismatch) motor.dq = -motor.dq;
+    if (lasts && cause_ == StopCause::kJointFrozen) {
+      if (!frozen_) frozen_ = motor;
+      motor.q = frozen_->q;
+      motor.dq = frozen_->dq;
+      motor.tau_est = frozen_->tau_est;
+    }
+    if (cause_ != StopCause::kJointRange) return;
+    const double most = robot_->joints[robot_->roles.arms[0][kElbow]].upper + kBeyond - motor.q;
+    const double before = drifted_;
+    const double wanted = lasts ? most : 0.0;
+    drifted_ += std::clamp(wanted - drifted_, -kDrifts * kTwinPeriod, kDrifts * kTwinPeriod);
+    motor.q += static_cast<float>(drifted_);
+    motor.dq += static_cast<float>((drifted_ - before) / kTwinPeriod);
   }
 
   void note() {
@@ -153,6 +181,8 @@ class HoldRun {
   GuardReport report_;
   Eigen::Vector3d before_ = Eigen::Vector3d::Zero();
   bool paused_ = false, reached_ = false;
+  std::optional<MotorStateFrame> frozen_;  // of the elbow
+  double drifted_ = 0.0;                   // its zero [rad]
   HoldTrial result_;
 };
 
@@ -160,10 +190,11 @@ class HoldRun {
 
 const std::vector<StopCause>& causes_of_holds() {
   using C = StopCause;
-  static const std::vector<StopCause> causes = {C::kPersonAge,   C::kDeadMan,   C::kRemoteAge,   C::kPlannerAge,
-                                                C::kStateAge,    C::kBadStates, C::kOdometryAge, C::kOdometryJump,
-                                                C::kLoopLate,    C::kTilt,      C::kJointSpeed,  C::kGyro,
-                                                C::kTemperature, C::kCharge,    C::kMode,        C::kForeignWriter};
+  static const std::vector<StopCause> causes = {
+      C::kPersonAge,   C::kDeadMan,       C::kRemoteAge, C::kPlannerAge,    C::kStateAge,   C::kBadStates,
+      C::kOdometryAge, C::kOdometryJump,  C::kLoopLate,  C::kTilt,          C::kJointSpeed, C::kGyro,
+      C::kTemperature, C::kCharge,        C::kMode,      C::kForeignWriter, C::kStateDelay, C::kJointJump,
+      C::kJointFrozen, C::kJointMismatch, C::kJointRange};
   return causes;
 }
 

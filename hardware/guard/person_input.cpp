@@ -13,6 +13,7 @@ namespace {
 constexpr std::uint32_t kFirstPersonVersion = 0x314A5044, kPersonVersion = 0x324A5044;  // "DPJ1", "DPJ2"
 constexpr double kFarthestJoint = 20.0, kLongestBone = 1.0;                             // [m]
 constexpr int kMostEstimates = 16;                                                      // of a tick
+constexpr double kJitter = 0.03;  // of the way of a message, less than a picture; no latency [s]
 
 struct PersonWire {
   std::uint32_t version, seen;
@@ -85,7 +86,8 @@ Pose PersonPlacer::base_at(double time) const {
 PersonFault PersonPlacer::place(const PersonEstimate& estimate, double now, PersonMessage& message) {
   if (!order_.takes(estimate.sequence, now)) return PersonFault::kOld;
   if (!estimate.seen) return PersonFault::kUnseen;
-  const double latency = estimate.latency + camera_.latency;
+  const double late = way_.see(estimate.stamp, now);
+  const double latency = estimate.latency + camera_.latency + (late > kJitter ? late : 0.0);
   if (const PersonFault fault = fault_of_latency(latency); fault != PersonFault::kNone) return fault;
   const Pose X_WC = base_at(now - latency) * camera_.X_BC;
   message.sequence = ++sequence_;

@@ -1,6 +1,7 @@
 // The partner as a camera sees them: SMPL joints over a local socket, about 30 times a second, from any estimator. The
 // message is documented in docs/hardware.md, "Perception"; time is that of reception, less the latency that the message
-// states. A pure function of what is received, but for PersonInput's socket. One owner, one thread.
+// states and what its way took longer than it can. A pure function of what is received, but for PersonInput's socket.
+// One owner, one thread.
 #pragma once
 
 #include <array>
@@ -11,12 +12,13 @@
 #include "duet/hardware/guard/person_track.h"
 #include "duet/hardware/guard/robot_guard.h"
 #include "duet/hardware/wire/datagram_socket.h"
+#include "duet/hardware/wire/sender_clock.h"
 
 namespace duet {
 
 struct PersonEstimate {
   std::uint64_t sequence = 0;                // rises
-  double stamp = 0.0;                        // the sender's clock, for the sender's logs; never used here [s]
+  double stamp = 0.0;                        // the sender's clock when the message leaves; constant: none [s]
   bool seen = false;                         // somebody is in the picture
   HumanJoints joints = HumanJoints::Zero();  // SMPL-24, in the camera's frame [m]
   double latency = 0.0;                      // from the picture to this message [s]
@@ -51,6 +53,7 @@ class PersonPlacer {
   std::array<Base, kBases> bases_{};
   std::size_t newest_ = 0;
   StreamOrder order_;
+  SenderDelay way_{true};
   std::uint64_t sequence_ = 0;
 };
 

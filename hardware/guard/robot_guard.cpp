@@ -16,11 +16,10 @@ constexpr double kWritersPeriod = 0.1;
 // Angle from the stance at which the robot counts as standing [rad].
 constexpr double kStanding = 0.05;
 constexpr double kWalkerPeriod = 0.02;  // [s]
+constexpr double kStatePeriod = 0.002;  // of the robot [s]
 constexpr long kTicksToNewWriter = 50;
 // Faster than anybody moves a joint of theirs: a jump of the estimate [m/s].
 constexpr double kPersonJump = 10.0;
-// A joint's measured angle may be beyond its limit by this: play and zero error [rad].
-constexpr double kLimitSlack = 0.02;
 // Speeds that hold: of an arm's joint, and shares of the card's limit. A step of HOMIE's takes ankle and knee to 13
 // rad/s, one of WBC-Sim's an ankle to 15.
 constexpr double kArmSpeed = 10.0;    // [rad/s]
@@ -69,7 +68,9 @@ RobotGuard::RobotGuard(const GuardSetup& setup, FrameTransport& transport, Veloc
       transport_(transport),
       velocity_(velocity),
       limiter_(setup_.limiter),
-      contact_(contact_watch(setup_.limiter)) {
+      contact_(contact_watch(setup_.limiter)),
+      speed_limits_(speed_limits(*setup_.limiter.robot)),
+      watch_(*setup_.limiter.robot, speed_limits_) {
   setup_.rules.person_present = setup_.limiter.person;
   setup_.stance.tau_ff.setZero(kG1Motors);
   limiter_state_ = limiter_.start(setup_.limiter.robot->standing_state());
@@ -80,7 +81,6 @@ RobotGuard::RobotGuard(const GuardSetup& setup, FrameTransport& transport, Veloc
   status_.limited.q.setZero(kG1Motors);
   status_.limited.kp = status_.limited.kd = status_.restart_q = status_.limited.q;
   next_.period = setup_.limiter.dt;
-  speed_limits_ = speed_limits(*setup_.limiter.robot);
   speed_shares_.fill(Eigen::VectorXd::Zero(kG1Motors));
 }
 
@@ -165,13 +165,16 @@ void RobotGuard::tick(double now) {
 void RobotGuard::read_states(double now) {
   next_.bad_states = 0;
   status_.took_state = false;
+  bool came = false;
   while (transport_.take(status_.state_frame)) {
     status_.took_state = true;
     switch (read_state(status_.state_frame, reading_)) {
       case FrameFault::kNone:
         ++status_.states;
+        came = true;
         next_.state_at = now;
         watch_speeds();
+        watch_joints();
         continue;
       case FrameFault::kRepeated:
         continue;
@@ -187,6 +190,8 @@ void RobotGuard::read_states(double now) {
     }
     ++next_.bad_states;
   }
+  if (came && has_own_clock_) delay_.see(reading_.tick, now);
+  next_.state_delay = delay_.steady();
 }
 
 // A single sample is no speed: encoders are noisy, and a foot that lands shakes its ankle for a moment.
@@ -195,6 +200,19 @@ void RobotGuard::watch_speeds() {
   std::swap(speed_shares_[1], speed_shares_[0]);
   speed_shares_[0] = reading_.state.v.cwiseAbs().cwiseQuotient(speed_limits_);
   reading_.health.joint_speed_share = speed_shares_[0].cwiseMin(speed_shares_[1]).cwiseMin(speed_shares_[2]).maxCoeff();
+}
+
+// The angle of a joint that jumped is not believed: where it was before stands in for it, for whoever walks or limits.
+void RobotGuard::watch_joints() {
+  RobotState& state = reading_.state;
+  const double dt = kStatePeriod * count_.periods_to(reading_.tick);
+  watch_.see(state.q, state.v, reading_.tau, dt, !safety_.commands);
+  reading_.health.joints = watch_.doubts();
+  for (int j = 0; j < kG1Motors; ++j) {
+    if (!watch_.jumped(j)) continue;
+    state.q[j] = watch_.before_jump(j);
+    state.v[j] = 0.0;
+  }
 }
 
 // Reads the remote control, which counts only while states arrive that carry it.
@@ -215,12 +233,6 @@ void RobotGuard::check_robot() {
         next_.now - battery_at_ <= kBatteryAge ? battery_.charge : std::numeric_limits<double>::quiet_NaN();
   next_.health.mode_is_expected =
       !reading_.any || (reading_.mode_pr == kPitchRollMode && reading_.mode_machine == setup_.mode_machine);
-  const RobotModel& robot = *setup_.limiter.robot;
-  for (int j = 0; j < kG1Motors; ++j) {
-    const double q = reading_.state.q[j];
-    if (q < robot.joints[j].lower - kLimitSlack || q > robot.joints[j].upper + kLimitSlack)
-      next_.health.joints_in_range = false;
-  }
   if (ticks_to_writers_-- <= 0) {
     ticks_to_writers_ = static_cast<int>(kWritersPeriod / setup_.limiter.dt);
     next_.foreign_writer = transport_.foreign_writers() > 0;
@@ -330,15 +342,19 @@ void RobotGuard::send() {
   const SafetyOrder& order = status_.order;
   if (!order.writes || setup_.dry_run) {
     unsent_ = 0;
+    watch_.sent_none();
     if (transport_.has_writer()) transport_.close_writer();
     return;
   }
   if (!transport_.has_writer()) transport_.open_writer();
   const auto machine = static_cast<std::uint8_t>(setup_.mode_machine);
-  if (order.damps)
+  if (order.damps) {
     build_damping(kDampingGain, machine, status_.frame);
-  else
+    watch_.sent_none();
+  } else {
     build_command(joints_, machine, status_.frame);
+    watch_.sent(joints_.q_target);
+  }
   status_.sent = transport_.write(status_.frame);
   keep_writer();
   velocity_.send(was_planned_ ? status_.limited.root : VelocityCommand{0.0, 0.0, 0.0, setup_.limiter.limits.height});

@@ -11,10 +11,12 @@
 #include "duet/hardware/guard/person_track.h"
 #include "duet/hardware/guard/walker.h"
 #include "duet/hardware/safety/contact_watch.h"
+#include "duet/hardware/safety/joint_watch.h"
 #include "duet/hardware/safety/limiter.h"
 #include "duet/hardware/safety/safety_machine.h"
 #include "duet/hardware/wire/datagram_socket.h"
 #include "duet/hardware/wire/robot_wire.h"
+#include "duet/hardware/wire/sender_clock.h"
 
 namespace duet {
 
@@ -81,6 +83,8 @@ class RobotGuard {
   // Legs and waist are the walker's from when the robot stands until it is damped; without one they keep the stance.
   // Refers to it. Before the first tick.
   void let_walk(Walker& walker) { walker_ = &walker; }
+  // Time is counted by the robot's own states (in lock-step): a delay of theirs does not show. Before the first tick.
+  void has_robots_clock() { has_own_clock_ = false; }
   // As the stop key does, at the next tick.
   void stop() { stop_asked_ = true; }
 
@@ -105,6 +109,7 @@ class RobotGuard {
   void count_streams();
   void read_states(double now);
   void watch_speeds();
+  void watch_joints();
   void read_operator(double now);
   void check_robot();
   void follow_stance();
@@ -134,12 +139,15 @@ class RobotGuard {
   RobotReading reading_;
   Eigen::VectorXd speed_limits_;                 // of the joints [rad/s]
   std::array<Eigen::VectorXd, 3> speed_shares_;  // of these, in the last states, the newest first
+  StateCount count_;
+  StateDelay delay_;
+  JointWatch watch_;
   RobotState measured_;
   std::vector<AxisState> stance_;  // of all joints, on the way to the stance
   JointCommand joints_;
   SafetyMemory safety_;
   SafetyInput next_;
-  bool armed_ = false, was_planned_ = false, stop_asked_ = false;
+  bool armed_ = false, was_planned_ = false, stop_asked_ = false, has_own_clock_ = true;
   int ticks_to_writers_ = 0;
   Walker* walker_ = nullptr;
   const JointCommand* walker_joints_ = nullptr;

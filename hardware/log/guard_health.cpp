@@ -27,6 +27,7 @@ constexpr HealthNumber kNumbers[] = {{"time", &GuardHealth::time, Keeps::kLast},
                                      {"remote_age", &GuardHealth::remote_age, Keeps::kMost},
                                      {"dead_man_age", &GuardHealth::dead_man_age, Keeps::kMost},
                                      {"executor_age", &GuardHealth::executor_age, Keeps::kMost},
+                                     {"state_delay", &GuardHealth::state_delay, Keeps::kMost},
                                      {"late", &GuardHealth::late, Keeps::kMost},
                                      {"charge", &GuardHealth::charge, Keeps::kLast},
                                      {"casing", &GuardHealth::casing, Keeps::kMost},
@@ -96,6 +97,8 @@ void fill_health(const RobotGuard& guard, GuardHealth& health) {
   health.remote_age = age_of(input.now, input.remote_at);
   health.dead_man_age = age_of(input.now, input.dead_man_at);
   health.executor_age = age_of(input.now, input.executor_at);
+  health.state_delay = input.state_delay;
+  health.doubtful_joint = input.health.joints.joint;
   health.charge = guard.setup().has_battery ? input.health.charge : kUnknown;
   health.casing = input.health.casing;
   health.winding = input.health.winding;
@@ -153,7 +156,8 @@ nlohmann::json health_json(const HealthMessage& message) {
                          {"stands", message.health.stands},
                          {"missing", message.missing},
                          {"tracking_joint", message.tracking_joint},
-                         {"next", message.next}};
+                         {"next", message.next},
+                         {"doubtful_joint", message.doubtful_joint}};
   for (const HealthNumber& number : kNumbers) json[number.name] = number_or_null(message.health.*number.value);
   for (const HealthCount& count : kCounts) json[count.name] = message.health.*count.value;
   for (std::size_t k = 0; k < kPersonFaults; ++k) json["estimates"][estimate_name(k)] = message.health.person[k];
@@ -171,8 +175,11 @@ HealthMessage parse_health(std::string_view text, const std::string& name) {
     message.missing = json.at("missing").get<std::string>();
     message.tracking_joint = json.at("tracking_joint").get<std::string>();
     message.next = json.at("next").get<std::string>();
-    for (const HealthNumber& number : kNumbers)
+    if (json.contains("doubtful_joint")) message.doubtful_joint = json["doubtful_joint"].get<std::string>();
+    for (const HealthNumber& number : kNumbers) {
+      if (number.value == &GuardHealth::state_delay && !json.contains(number.name)) continue;  // not in logs of before
       message.health.*number.value = json.at(number.name).is_null() ? kUnknown : json.at(number.name).get<double>();
+    }
     for (const HealthCount& count : kCounts) message.health.*count.value = count_from(json.at(count.name), name);
     if (json.contains("estimates"))  // not in logs of before
       for (std::size_t k = 0; k < kPersonFaults; ++k)
@@ -188,11 +195,16 @@ std::string health_text(const HealthMessage& message) {
   const GuardHealth& h = message.health;
   std::string text = fmt::format("{} ({}){}\n  next: {}\n", safety_state_name(h.state), stop_cause_name(h.cause),
                                  message.missing.empty() ? "" : ", missing: " + message.missing, message.next);
+  if (const std::string_view why = stop_cause_text(h.cause); !why.empty()) text += fmt::format("  why: {}\n", why);
+  if (!message.doubtful_joint.empty()) text += fmt::format("  in doubt: {}\n", message.doubtful_joint);
   text +=
       fmt::format("  ages: {}, {}, {}, {}, {}, {}, {}; ticks late by {:.1f} ms at most\n",
                   age_text("state", h.state_age), age_text("planner", h.planner_age), age_text("person", h.person_age),
                   age_text("odometry", h.odometry_age), age_text("remote control", h.remote_age),
                   age_text("dead-man switch", h.dead_man_age), age_text("executor", h.executor_age), 1e3 * h.late);
+  constexpr double kShown = 0.001;  // [s]
+  if (h.state_delay > kShown)
+    text += fmt::format("  states come {:.0f} ms later than the fastest did\n", 1e3 * h.state_delay);
   text += fmt::format("  charge {}, hottest casing {:.0f} and winding {:.0f} degrees C, tilt {:.3f} rad\n",
                       known(h.charge, "%", 0), h.casing, h.winding, h.tilt);
   const std::string estimates = person_counts_text(h.person);

@@ -21,6 +21,7 @@ struct GuardHealth {
   double time = 0.0;    // by the guard's clock [s]
   double state_age = kUnknown, planner_age = kUnknown, person_age = kUnknown, odometry_age = kUnknown;
   double remote_age = kUnknown, dead_man_age = kUnknown, executor_age = kUnknown;
+  double state_delay = 0.0;                          // by which states come later than the fastest did [s]
   double late = 0.0;                                 // by which a tick came late [s]
   double charge = kUnknown;                          // [%]
   double casing = 0.0, winding = 0.0;                // hottest motor [degrees C]
@@ -28,6 +29,7 @@ struct GuardHealth {
   double share = kUnknown;                           // of all speeds, after the distance to a person
   double distance = kUnknown;                        // of the person from the robot, both as capsules [m]
   double tracking = kUnknown;                        // largest angle between a joint and its target [rad]
+  int doubtful_joint = -1;                           // that cannot be where its states say; -1: none
   long ticks = 0, states = 0, checksum_faults = 0, tick_faults = 0, number_faults = 0;
   long old_messages = 0, bad_messages = 0, restarts = 0;
   long left_out = 0;      // ticks that the log has no room for
@@ -39,6 +41,7 @@ struct HealthMessage {
   std::string missing = {};         // before arming
   std::string tracking_joint = {};  // whose angle `tracking` is
   std::string next = {};            // what the operator may do now
+  std::string doubtful_joint = {};  // the name of health.doubtful_joint
 };
 
 // The name of a count of estimates in messages: "used", "far", ...

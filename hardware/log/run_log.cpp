@@ -287,6 +287,8 @@ void RunLog::write_setup(std::uint64_t time) {
 void RunLog::write_plain(const Slot& slot, std::uint64_t time) {
   ticks_to_health_ = kTicksPerHealth - 1;
   HealthMessage message{window_, std::string(slot.missing), "", std::string(next_key(slot.state, slot.health.stands))};
+  if (slot.health.doubtful_joint >= 0)
+    message.doubtful_joint = setup_.limiter.robot->joints[slot.health.doubtful_joint].name;
   message.health.left_out = dropped_;
   message.health.distance = gap_.measure(slot.tick);
   if (slot.sent) measure_tracking(slot.frame, slot.tick, *setup_.limiter.robot, message);

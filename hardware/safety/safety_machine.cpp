@@ -99,7 +99,8 @@ std::string_view missing_for_arming(const SafetyRules& rules, const SafetyMemory
   if (health.charge < rules.warn_charge) return stop_cause_name(StopCause::kCharge);
   if (health.casing > rules.warn_casing || health.winding > rules.warn_winding)
     return stop_cause_name(StopCause::kTemperature);
-  if (!input.health.joints_in_range) return "joints_in_range";
+  if (health.joints.excess > rules.warn_range) return stop_cause_name(StopCause::kJointRange);
+  if (input.state_delay > rules.delay.warn) return stop_cause_name(StopCause::kStateDelay);
   return "";
 }
 
@@ -155,11 +156,41 @@ StopCause stand_waits_for(const SafetyRules& rules, const SafetyInput& input) {
 
 namespace {
 
-constexpr std::array<std::string_view, kStopCauses> kCauseNames = {
-    "none",           "state_age",  "bad_states",  "planner_age", "person_age",  "odometry_age",
-    "odometry_jump",  "remote_age", "dead_man",    "loop_late",   "clock",       "tilt",
-    "joint_speed",    "gyro",       "temperature", "charge",      "motor_error", "mode",
-    "foreign_writer", "stop_key",   "lapsed",      "lost_writer", "executor_age"};
+struct CauseText {
+  std::string_view name, text;
+};
+constexpr std::array<CauseText, kStopCauses> kCauses = {{
+    {"none", ""},
+    {"state_age", "no good state of the robot comes: look at cable, domain and what else loads the network"},
+    {"bad_states",
+     "states come with a wrong checksum, an old count or numbers that are none: is there another sender?"},
+    {"planner_age", "no good command of the planner comes: start it anew, or look at what it sends"},
+    {"person_age", "nobody says where the person is: look at the camera and at why estimates are refused"},
+    {"odometry_age", "nothing measures the robot's place: look at the source of odometry"},
+    {"odometry_jump", "the measured place jumped: begin only when its source is steady again"},
+    {"remote_age", "the remote control is not heard: switch it on, come nearer"},
+    {"dead_man", "R1 was let go: hold it to go on"},
+    {"loop_late", "this program was held up: end what else runs here, give it real-time priority"},
+    {"clock", "the clock went backwards"},
+    {"tilt", "the robot leans: look at its feet, its rope and its IMU"},
+    {"joint_speed", "a joint is too fast, three states in a row"},
+    {"gyro", "the trunk turns too fast"},
+    {"temperature", "a motor is hot: let it rest until it is below the warning"},
+    {"charge", "the battery is low, or does not say its charge: change it"},
+    {"motor_error", "a motor reports an error: read its code in the log, and do not go on before it is known"},
+    {"mode", "mode_machine or mode_pr is another than configured: another robot, or debug mode half entered"},
+    {"foreign_writer", "somebody else commands the robot: end that program, or release the motion service"},
+    {"stop_key", "the operator stopped it"},
+    {"lapsed", "it was armed for a minute and nothing was asked of it"},
+    {"lost_writer", "commands do not leave this computer: look at the network"},
+    {"executor_age", "the program that executes the commands is not heard or not well"},
+    {"state_delay",
+     "states come later and later: a queue fills somewhere; look at wireless links and at what else sends"},
+    {"joint_jump", "a joint's angle jumped and has not come back: encoder, wiring or order of the joints"},
+    {"joint_frozen", "angle, speed and torque of joints stand still to the bit while states come: their bus hangs"},
+    {"joint_mismatch", "a joint's speed is not that of its angle: order of the joints, or a sensor"},
+    {"joint_range", "a joint is beyond its limits: its zero is wrong, or it was calibrated in another pose"},
+}};
 
 StopLevel damp_if(bool wrong) { return wrong ? StopLevel::kDamp : StopLevel::kFine; }
 StopLevel hold_if(bool wrong) { return wrong ? StopLevel::kHold : StopLevel::kFine; }
@@ -191,6 +222,11 @@ void assess_robot(const SafetyRules& rules, const SafetyInput& input, const BadS
   worsen(all, level_of(health.tilt, {kNoLimit, rules.hold_tilt, rules.damp_tilt}), StopCause::kTilt);
   worsen(all, hold_if(!(health.joint_speed_share <= rules.joint_speed_share)), StopCause::kJointSpeed);
   worsen(all, hold_if(!(health.gyro <= rules.gyro)), StopCause::kGyro);
+  worsen(all, hold_if(health.joints.jump), StopCause::kJointJump);
+  worsen(all, level_of(health.joints.excess, {rules.warn_range, rules.hold_range}), StopCause::kJointRange);
+  worsen(all, hold_if(health.joints.frozen), StopCause::kJointFrozen);
+  worsen(all, hold_if(health.joints.mismatch), StopCause::kJointMismatch);
+  worsen(all, level_of(input.state_delay, rules.delay), StopCause::kStateDelay);
   worsen(all, level_of(health.casing, {rules.warn_casing, rules.hold_casing}), StopCause::kTemperature);
   worsen(all, level_of(health.winding, {rules.warn_winding, rules.hold_winding}), StopCause::kTemperature);
   worsen(all, level_of(-health.charge, {-rules.warn_charge, -rules.hold_charge}), StopCause::kCharge);
@@ -212,7 +248,8 @@ void assess_motion(const SafetyRules& rules, const SafetyInput& input, Assessmen
 
 }  // namespace
 
-std::string_view stop_cause_name(StopCause cause) { return kCauseNames[static_cast<std::size_t>(cause)]; }
+std::string_view stop_cause_name(StopCause cause) { return kCauses[static_cast<std::size_t>(cause)].name; }
+std::string_view stop_cause_text(StopCause cause) { return kCauses[static_cast<std::size_t>(cause)].text; }
 
 void note_bad_states(int count, double now, BadStates& bad) {
   for (int k = 0; k < std::min(count, static_cast<int>(BadStates::kKept)); ++k) {

@@ -6,6 +6,8 @@
 #include <limits>
 #include <string_view>
 
+#include "duet/hardware/safety/joint_watch.h"
+
 namespace duet {
 
 // How well the links to the robot, the planner, the person and the operator are, and what follows from each: the table
@@ -38,9 +40,17 @@ enum class StopCause {
   kLapsed,       // armed for too long without anything to do
   kLostWriter,   // what is written does not leave any more
   kExecutorAge,  // nothing from who executes the commands
+  kStateDelay,   // states take longer to get here than the fastest did
+  // A state says what cannot be (hardware/safety/joint_watch.h).
+  kJointJump,
+  kJointFrozen,
+  kJointMismatch,
+  kJointRange,
 };
-inline constexpr std::size_t kStopCauses = 23;
+inline constexpr std::size_t kStopCauses = 28;
 std::string_view stop_cause_name(StopCause cause);  // "state_age", ...
+// What it means and what to look at, as a sentence for the screen; "" for kNone.
+std::string_view stop_cause_text(StopCause cause);
 
 inline constexpr double kNever = -std::numeric_limits<double>::infinity();
 
@@ -60,15 +70,17 @@ struct SafetyRules {
   AgeLimits person{0.1, 0.25};
   AgeLimits odometry{0.05, 0.15};
   AgeLimits remote{0.1, 0.2};
-  AgeLimits executor{0.3, 0.6};              // read where `executor_answers`
-  AgeLimits loop{0.005, 0.040};              // by which a tick comes late
-  AgeLimits writer{0.006, kNoLimit, 0.100};  // since a frame last left
-  int hold_bad_states = 3;                   // within
-  double hold_bad_time = 0.050;              // [s]
-  double odometry_jump = 0.1;                // [m]
-  double hold_tilt = 0.5, damp_tilt = 1.0;   // [rad]
-  double joint_speed_share = 1.0;            // RobotHealth
-  double gyro = 6.0;                         // [rad/s]
+  AgeLimits executor{0.3, 0.6};                // read where `executor_answers`
+  AgeLimits delay{0.020, 0.050};               // SafetyInput::state_delay
+  AgeLimits loop{0.005, 0.040};                // by which a tick comes late
+  AgeLimits writer{0.006, kNoLimit, 0.100};    // since a frame last left
+  int hold_bad_states = 3;                     // within
+  double hold_bad_time = 0.050;                // [s]
+  double odometry_jump = 0.1;                  // [m]
+  double hold_tilt = 0.5, damp_tilt = 1.0;     // [rad]
+  double joint_speed_share = 1.0;              // RobotHealth
+  double gyro = 6.0;                           // [rad/s]
+  double warn_range = 0.02, hold_range = 0.1;  // of a joint beyond its limits: play and zero error; more [rad]
   // A warning is no reason to stop, but keeps it from being armed.
   double warn_casing = 75.0, hold_casing = 85.0;  // [degrees C]
   double warn_winding = 100.0, hold_winding = 120.0;
@@ -93,7 +105,7 @@ struct RobotHealth {
   double charge = 100.0;               // [%]; NaN: not known, which holds
   bool motor_error = false;
   bool mode_is_expected = true;  // mode_pr, mode_machine
-  bool joints_in_range = true;
+  JointDoubts joints;
 };
 
 // Clock readings are of one monotonic clock of this program, at reception [s].
@@ -102,6 +114,7 @@ struct SafetyInput {
   double period = 0.002;     // of ticks [s]
   double state_at = kNever;  // last good state of the robot
   int bad_states = 0;        // since the last tick
+  double state_delay = 0.0;  // by which states come later than the fastest did, steadily [s]
   double planner_at = kNever, person_at = kNever, odometry_at = kNever, remote_at = kNever;
   double executor_at = kNever;
   double written_at = kNoLimit;  // when a frame last left, by ticks in which one should have; kNoLimit: none has to

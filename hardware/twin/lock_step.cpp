@@ -63,6 +63,7 @@ bool LockStepWire::write(const LowCommandFrame& frame) {
 void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocket* planner, double period,
                             const LockStepCallbacks& callbacks) {
   GuardMessage message;
+  guard.has_robots_clock();
   double now = 0.0;
   bool reported = false;
   int silent = 0;
@@ -160,7 +161,12 @@ void TwinInProcess::step_twin() {
   twin_.step(kTwinPeriod);
   if (after_step) after_step();
   LowStateFrame frame;
-  if (faulty_.next_state(twin_.time(), frame)) wire_.states.push_back(frame);
+  if (!faulty_.next_state(twin_.time(), frame)) return;
+  if (trouble.spoil) {
+    trouble.spoil(frame);
+    seal(frame);
+  }
+  wire_.states.push_back(frame);
 }
 
 void TwinInProcess::pause(double seconds) {

@@ -68,9 +68,10 @@ class LockStepTwin {
 // Troubles between guard and twin that are none of the twin's states (TwinFault).
 struct TwinTrouble {
   int foreign_writers = 0;
-  bool odometry = true;  // is heard
-  double jump = 0.0;     // of odometry, along x [m]
-  bool writes = true;    // commands leave
+  bool odometry = true;                            // is heard
+  double jump = 0.0;                               // of odometry, along x [m]
+  bool writes = true;                              // commands leave
+  std::function<void(LowStateFrame&)> spoil = {};  // of each state, before its checksum
 };
 
 // A guard, a twin and its operator in this process, one tick after the other: what two processes are over DDS, without

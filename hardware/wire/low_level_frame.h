@@ -113,7 +113,7 @@ struct RobotReading {
 };
 
 // Reads a state that is whole and newer than the one in `reading`; leaves `reading` as it was for any other.
-// `health.mode_is_expected` and `joints_in_range` are left to whoever knows the robot.
+// `health.mode_is_expected` and `joints` are left to whoever knows the robot.
 FrameFault read_state(const LowStateFrame& frame, RobotReading& reading);
 
 // The checksum of the G1's low-level messages: CRC-32/MPEG-2 (polynomial 0x04C11DB7, first value 0xFFFFFFFF, nothing

@@ -93,7 +93,6 @@ constexpr double kPullTime = 0.05;       // in which the soles pull the speed to
 constexpr double kSlip = 0.1;            // difference from the speed so far at which a sole pulls half as much [m/s]
 // The share left of the pull of a sole that stands and disagrees altogether: after a stumble the speed comes back.
 constexpr double kLeastTrust = 0.01;
-constexpr double kMostPeriods = 50.0;   // a robot that was silent for longer is damped
 constexpr double kLittleWeight = 0.05;  // of all soles, at which they pull half as much
 
 const RobotModel& with_soles(const std::shared_ptr<const RobotModel>& robot) {
@@ -112,21 +111,14 @@ LegOdometry::LegOdometry(std::shared_ptr<const RobotModel> robot, double period)
 }
 
 void LegOdometry::see(const LowStateFrame& frame) {
-  const bool follows = reading_.any;
-  const std::uint32_t before = reading_.tick;
   if (read_state(frame, reading_) != FrameFault::kNone) return;
+  const double periods = count_.periods_to(reading_.tick);
   Eigen::Vector3d force;
   for (int axis = 0; axis < 3; ++axis) {
     if (!std::isfinite(frame.imu.accelerometer[axis])) return;
     force[axis] = frame.imu.accelerometer[axis];
   }
-  update(reading_.state, force, follows ? periods_since(before) : 1.0);
-}
-
-double LegOdometry::periods_since(std::uint32_t tick) {
-  const std::uint32_t rise = reading_.tick - tick;
-  least_rise_ = std::min(least_rise_, rise);
-  return std::min(static_cast<double>(rise) / static_cast<double>(least_rise_), kMostPeriods);
+  update(reading_.state, force, periods);
 }
 
 bool LegOdometry::take(OdometrySample& sample) {

@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "duet/hardware/wire/datagram_socket.h"
 #include "duet/hardware/wire/low_level_frame.h"
 #include "duet/hardware/wire/robot_wire.h"
+#include "duet/hardware/wire/sender_clock.h"
 #include "duet/robots/kinematics.h"
 
 namespace duet {
@@ -92,13 +92,12 @@ class LegOdometry final : public OdometryReader {
 
   void place_soles(const RobotState& state);
   void pull(double gain, bool robust);
-  double periods_since(std::uint32_t tick);
 
   std::shared_ptr<const RobotModel> robot_;
   double period_;
   Kinematics kinematics_;
   RobotReading reading_;
-  std::uint32_t least_rise_ = std::numeric_limits<std::uint32_t>::max();  // of the robot's count between two states
+  StateCount count_;
   std::vector<Sole> soles_;
   double lowest_ = 0.0;  // of the soles [m]
   Eigen::MatrixXd jacobian_;

@@ -140,20 +140,25 @@ class ArmedRun {
   void say_state(const GuardStatus& status) {
     last_ = status.safety.state;
     said_at_ = status.input.now;
-    note(session_,
-         fmt::format("{} ({}){}", safety_state_name(last_), stop_cause_name(status.safety.cause), next_step()));
+    note(session_, fmt::format("{} ({}){}{}", safety_state_name(last_), stop_cause_name(status.safety.cause),
+                               next_step(), why()));
   }
   [[nodiscard]] std::string next_step() const {
     if (last_ == SafetyState::kHold) return fmt::format(": it stands until {} (with R1), or select", held_key());
     const bool damped = last_ == SafetyState::kDamp || last_ == SafetyState::kFault;
     return damped || (armed_ && last_ == SafetyState::kListen) ? fmt::format(": {}", kTwice) : "";
   }
+  // The cause in words, and the joint that it is about.
+  [[nodiscard]] std::string why() const {
+    const std::string_view text = stop_cause_text(guard_.status().safety.cause);
+    return text.empty() ? "" : fmt::format("\n  {}{}", text, in_doubt_text(guard_));
+  }
   [[nodiscard]] std::string_view held_key() const { return guard_.status().input.stands ? "A" : "start"; }
   // Now and then while it waits: nobody else says why.
   void say_what_it_waits_for(const GuardStatus& status) {
     std::string waits;
     if (last_ == SafetyState::kListen && !armed_ && !status.safety.missing.empty())
-      waits = fmt::format("lately missing: {}", status.safety.missing);
+      waits = fmt::format("lately missing: {}{}", status.safety.missing, in_doubt_text(guard_));
     if (last_ == SafetyState::kStand && !status.input.stands) waits = stand_waits(status);
     const long refused = refused_estimates(status.person);
     if (refused > told_refused_)

@@ -14,6 +14,8 @@ namespace duet::cli {
 nlohmann::json status_json(const RobotGuard& guard);
 // `seconds`: for which it has listened.
 std::string status_text(const RobotGuard& guard, double seconds);
+// The joint that cannot be where its states say: " (left_elbow_joint)"; "" where none is.
+std::string in_doubt_text(const RobotGuard& guard);
 
 // Asks the system for real-time priority, for this thread and those that it makes from now on, and says what came of
 // it.

@@ -17,7 +17,7 @@ std::string readiness(const RobotGuard& guard) {
   const GuardStatus& status = guard.status();
   if (status.safety.state == SafetyState::kOffline) return "no state has come";
   const std::string_view missing = missing_for_arming(guard.setup().rules, status.safety, status.input);
-  if (!missing.empty()) return fmt::format("missing: {}", missing);
+  if (!missing.empty()) return fmt::format("missing: {}{}", missing, in_doubt_text(guard));
   const std::string state(safety_state_name(status.safety.state));
   const bool was_missing = status.safety.state == SafetyState::kListen && !status.safety.missing.empty();
   return was_missing ? fmt::format("{} (lately missing: {})", state, status.safety.missing) : state;
@@ -62,6 +62,11 @@ std::string real_time_text() {
   return ask_for_real_time() ? "real-time priority: yes"
                              : "real-time priority: no (it takes CAP_SYS_NICE or a limit rtprio); a machine that is "
                                "busy with other things will be late, and hold the robot";
+}
+
+std::string in_doubt_text(const RobotGuard& guard) {
+  const int joint = guard.status().input.health.joints.joint;
+  return joint < 0 ? "" : fmt::format(" ({})", guard.setup().limiter.robot->joints[joint].name);
 }
 
 nlohmann::json status_json(const RobotGuard& guard) {

@@ -2,7 +2,12 @@
 // was sent is inside its limits.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
 #include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "duet/core/numbers.h"
 #include "tests/hardware/guarded_twin.h"
@@ -193,6 +198,130 @@ TEST(FaultMatrix, ASpeedCountsAfterThreeStatesByTheJointsOwnLimit) {
       EXPECT_EQ(after_fast_states(joint, sign * (most - 0.1), 20), SafetyState::kRun) << joint;
       EXPECT_EQ(after_fast_states(joint, sign * (most + 0.1), 3), SafetyState::kHold) << joint;
     }
+}
+
+// The states of both arms change places, joint by joint.
+void exchange_arms(LowStateFrame& frame, bool reversed) {
+  const std::vector<std::vector<int>>& arms = test::g1()->roles.arms;
+  const LowStateFrame before = frame;
+  for (std::size_t k = 0; k < arms[0].size(); ++k)
+    for (std::size_t side = 0; side < 2; ++side)
+      frame.motor[arms[side][k]] = before.motor[reversed ? arms[side][arms[side].size() - 1 - k] : arms[1 - side][k]];
+}
+
+TwinOptions noisy_joints() {
+  TwinOptions options;
+  options.joint_noise = 0.002;
+  options.joint_speed_noise = 0.1;
+  return options;
+}
+
+struct Implausible {
+  const char* name;
+  std::function<void(LowStateFrame&)> change;
+  StopCause cause;
+  double within;  // [s]
+};
+
+std::vector<Implausible> implausible_joints() {
+  const std::vector<int>& arm = test::g1()->roles.arms[0];
+  const int elbow = arm[3], knee = test::g1()->roles.legs[1][3];
+  const double beyond = test::g1()->joints[elbow].upper + 0.2;
+  return {
+      {"an angle of 30,000 rad", [=](LowStateFrame& f) { f.motor[knee].q = 30000.0f; }, StopCause::kJointJump, 0.0},
+      {"an elbow 0.2 rad off", [=](LowStateFrame& f) { f.motor[elbow].q += 0.2f; }, StopCause::kJointJump, 0.0},
+      {"arms reversed", [](LowStateFrame& f) { exchange_arms(f, true); }, StopCause::kJointJump, 0.0},
+      {"arms swapped", [](LowStateFrame& f) { exchange_arms(f, false); }, StopCause::kJointJump, 0.0},
+      {"joints frozen, fresh ticks",
+       [kept = std::optional<LowStateFrame>()](LowStateFrame& f) mutable {
+         if (!kept) kept = f;
+         std::copy_n(kept->motor, kG1Motors, f.motor);
+       },
+       StopCause::kJointFrozen, 0.05},
+      {"an elbow without a speed", [=](LowStateFrame& f) { f.motor[elbow].dq = 0.0f; }, StopCause::kJointMismatch, 1.5},
+      {"speeds of the other elbow",
+       [=](LowStateFrame& f) { std::swap(f.motor[elbow].dq, f.motor[test::g1()->roles.arms[1][3]].dq); },
+       StopCause::kJointMismatch, 1.5},
+      {"an elbow whose zero drifts",
+       [=, off = 0.0](LowStateFrame& f) mutable {
+         off = std::min(off + 0.002, beyond - f.motor[elbow].q);
+         f.motor[elbow].q += static_cast<float>(off);
+         f.motor[elbow].dq += 1.0f;
+       },
+       StopCause::kJointRange, 3.0}};
+}
+
+// F18: what a state says of the joints cannot be. One elbow goes up and down.
+TEST(FaultMatrix, JointsThatCannotBeWhereTheySayHoldAndAreNotBelieved) {
+  const int elbow = test::g1()->roles.arms[0][3];
+  for (const Implausible& fault : implausible_joints()) {
+    GuardedTwin robot(test::twin_guard(), noisy_joints());
+    robot.start();
+    const auto swing = [&] {
+      robot.message.command.q[elbow] = test::g1()->neutral[elbow] + (robot.ticks / 500 % 2 == 0 ? 0.3 : -0.3);
+    };
+    for (int k = 0; k < 2000; ++k) {
+      swing();
+      robot.tick();
+    }
+    ASSERT_EQ(robot.state(), SafetyState::kRun) << fault.name << ": " << stop_cause_name(robot.cause());
+    robot.spoil = in_each(fault.change);
+    const double begin = robot.now;
+    while (robot.state() == SafetyState::kRun && robot.now - begin < 4.0) {
+      swing();
+      robot.tick();
+    }
+    EXPECT_EQ(robot.state(), SafetyState::kHold) << fault.name;
+    EXPECT_EQ(robot.cause(), fault.cause) << fault.name << ": " << stop_cause_name(robot.cause());
+    EXPECT_LE(robot.now - begin, fault.within + 2.5 * kTick) << fault.name;
+    EXPECT_GE(robot.guard.status().input.health.joints.joint, 0) << fault.name;
+    const Eigen::VectorXd before = robot.guard.measured().q;
+    robot.run_for(1.0);
+    if (fault.cause == StopCause::kJointJump) {
+      EXPECT_LT((robot.guard.measured().q - before).cwiseAbs().maxCoeff(), 0.1) << fault.name;
+    }
+    EXPECT_EQ(robot.state(), SafetyState::kHold) << fault.name;
+    expect_inside(robot, fault.name);
+  }
+}
+
+// Every state comes; a queue on the way grows by one now and then.
+std::function<void(Frames&)> queued(std::size_t most, int every) {
+  return [=, waiting = Frames(), k = 0](Frames& frames) mutable {
+    waiting.insert(waiting.end(), frames.begin(), frames.end());
+    frames.clear();
+    if (++k % every == 0 && waiting.size() <= most) return;
+    frames.push_back(waiting.front());
+    waiting.pop_front();
+  };
+}
+
+// F11: no state is older than 4 ms by its reception.
+TEST(FaultMatrix, StatesThatComeLaterAndLaterHold) {
+  GuardedTwin robot;
+  robot.start();
+  robot.spoil = queued(1000, 10);
+  const double taken = robot.time_to_leave(SafetyState::kRun);
+  EXPECT_EQ(robot.state(), SafetyState::kHold);
+  EXPECT_EQ(robot.cause(), StopCause::kStateDelay);
+  EXPECT_NEAR(taken, 10 * 0.05 + 0.1, 0.1);
+  robot.run_for(1.0);
+  expect_inside(robot, "delay");
+  GuardedTwin little;
+  little.start();
+  little.spoil = queued(8, 10);
+  little.run_for(3.0);
+  EXPECT_EQ(little.state(), SafetyState::kRun);
+}
+
+TEST(FaultMatrix, StatesThatComeLateKeepItFromBeingArmed) {
+  GuardedTwin robot;
+  robot.run_for(1.5);
+  robot.spoil = queued(15, 2);
+  robot.run_for(4.0);
+  EXPECT_EQ(robot.state(), SafetyState::kListen);
+  EXPECT_EQ(robot.guard.status().safety.missing, "state_delay");
+  EXPECT_NEAR(robot.guard.status().input.state_delay, 0.03, 0.003);
 }
 
 TEST(FaultMatrix, APlannerThatDiesHoldsWithoutEnd) {

@@ -96,7 +96,8 @@ EDITS = {
         ('arming: heat', unless('health.casing > rules.warn_casing || health.winding > rules.warn_winding')),
         ('armed once, never without commands', choice('order.writes = memory.commands', 'order.writes = memory.state >= SafetyState::kArmed')),
         ('time of damping', unless('input.now - memory.since < rules.damp_time')),
-        ('joints in range before arming', unless('!input.health.joints_in_range')),
+        ('arming: joints in range', unless('health.joints.excess > rules.warn_range')),
+        ('arming: states that come late', unless('input.state_delay > rules.delay.warn')),
         ('fault stands', choice('again ? SafetyState::kListen : SafetyState::kFault', 'SafetyState::kListen')),
         ('run only where it stands', choice('input.run && input.stands && well', 'input.run && well')),
         ('run only where all is well', choice('assess(rules, input, memory.bad, memory.last_now, true).level < StopLevel::kHold',
@@ -234,10 +235,10 @@ LAX_OF_CONTACT = {'shoulder_torque': 1e9, 'wrist_torque': 1e9, 'release_effort':
 # The value of each rule with which the rule is missing.
 LAX_RULES = {'hold_bad_states': 1000000, 'hold_bad_time': 0,
              'odometry_jump': 1e9, 'hold_tilt': 1e9,
-             'damp_tilt': 1e9, 'joint_speed_share': 1e9, 'gyro': 1e9, 'warn_casing': 1e9, 'hold_casing': 1e9,
+             'damp_tilt': 1e9, 'joint_speed_share': 1e9, 'gyro': 1e9, 'warn_range': 1e9, 'hold_range': 1e9, 'warn_casing': 1e9, 'hold_casing': 1e9,
              'warn_winding': 1e9, 'hold_winding': 1e9, 'warn_charge': -1, 'hold_charge': -1}
 AGES = {'state': 'warn hold damp', 'planner': 'hold', 'person': 'warn hold', 'odometry': 'warn hold',
-        'remote': 'warn hold', 'loop': 'warn hold', 'executor': 'warn hold', 'writer': 'warn damp'}
+        'remote': 'warn hold', 'loop': 'warn hold', 'executor': 'warn hold', 'delay': 'warn hold', 'writer': 'warn damp'}
 # Those that are tried elsewhere in the table, and why.
 ELSEWHERE = {'late_share': 'a late planner slows down', 'ready_time': 'time to be ready', 'armed_time': 'arming lapses (kLapsed)',
              'hold_time': 'time of a hold', 'damp_time': 'time of damping',

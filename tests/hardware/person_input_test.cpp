@@ -154,6 +154,29 @@ TEST(PersonPlacer, OldRepeatedUnseenAndLateEstimatesAreLeftOut) {
   EXPECT_EQ(slow.receive(late, 10.0), PersonFault::kLate);  // with the camera's own
 }
 
+// F11: a way that takes longer than the shortest is a latency; where the estimator has our clock, all of it is.
+TEST(PersonPlacer, WhatItsMessageTookLongerThanItCanIsALatency) {
+  const auto sent_at = [](std::uint64_t sequence, double stamp) {
+    PersonEstimate estimate = someone(sequence);
+    estimate.stamp = stamp;
+    return estimate;
+  };
+  Placed placed;
+  EXPECT_EQ(placed.receive(sent_at(1, 500.0), 10.0), PersonFault::kNone);
+  EXPECT_EQ(placed.receive(sent_at(2, 500.1), 10.12), PersonFault::kNone);
+  EXPECT_EQ(placed.message.latency, 0.0) << "less than a picture is jitter";
+  EXPECT_EQ(placed.receive(sent_at(3, 500.2), 10.3), PersonFault::kNone);
+  EXPECT_NEAR(placed.message.latency, 0.1, 1e-3);
+  EXPECT_EQ(placed.receive(sent_at(4, 500.3), 10.6), PersonFault::kLate);
+  Placed same;
+  EXPECT_EQ(same.receive(sent_at(1, 9.0), 10.0), PersonFault::kNone);
+  EXPECT_EQ(same.receive(sent_at(2, 9.1), 10.1), PersonFault::kLate);
+  Placed clockless;
+  EXPECT_EQ(clockless.receive(sent_at(1, 0.0), 1.0), PersonFault::kNone);
+  EXPECT_EQ(clockless.receive(sent_at(2, 0.0), 1.3), PersonFault::kNone);
+  EXPECT_EQ(clockless.message.latency, 0.0);
+}
+
 TEST(PersonTrack, IsLostWhereThePictureIsOldWhateverTheSendersClockSays) {
   PersonTrack track;
   HumanJoints joints;

@@ -217,7 +217,7 @@ TEST(RobotGuard, AJointBeyondItsLimitKeepsItFromBeingReady) {
   };
   robot.run_for(3.0);
   EXPECT_EQ(robot.state(), SafetyState::kListen);
-  EXPECT_EQ(robot.guard.status().safety.missing, "joints_in_range");
+  EXPECT_EQ(robot.guard.status().safety.missing, "joint_range");
 }
 
 // A twin whose left elbow was left 0.6 rad from the stance, armed and damped; the key that stands it up was pressed.

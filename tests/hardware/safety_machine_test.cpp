@@ -54,8 +54,13 @@ TEST(SafetyMachine, ABadMomentBeginsTheTwoSecondsAnew) {
 
 TEST(SafetyMachine, ReadyEndsWithWhatMadeItReady) {
   SimulatedSafety robot = in_state(SafetyState::kReady);
-  robot.tick([](SafetyInput& in) { in.health.joints_in_range = false; });
+  robot.tick([](SafetyInput& in) { in.health.joints.excess = 0.03; });
   EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+  EXPECT_EQ(robot.memory.missing, "joint_range");
+  SimulatedSafety late = in_state(SafetyState::kReady);
+  late.tick([](SafetyInput& in) { in.state_delay = 0.03; });
+  EXPECT_EQ(late.memory.state, SafetyState::kListen);
+  EXPECT_EQ(late.memory.missing, "state_delay");
 }
 
 TEST(SafetyMachine, ArmsOnlyFromReady) {

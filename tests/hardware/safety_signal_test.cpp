@@ -201,6 +201,13 @@ TEST(SafetySignals, EverythingElseHasItsLevel) {
   expect_stop([](SafetyInput& in) { in.foreign_writer = true; }, StopLevel::kHold, StopCause::kForeignWriter);
   expect_stop([](SafetyInput& in) { in.stop_key = true; }, StopLevel::kDamp, StopCause::kStopKey);
   expect_stop([](SafetyInput& in) { in.odometry_step = 0.101; }, StopLevel::kHold, StopCause::kOdometryJump);
+  expect_stop([](SafetyInput& in) { in.health.joints.jump = true; }, StopLevel::kHold, StopCause::kJointJump);
+  expect_stop([](SafetyInput& in) { in.health.joints.frozen = true; }, StopLevel::kHold, StopCause::kJointFrozen);
+  expect_stop([](SafetyInput& in) { in.health.joints.mismatch = true; }, StopLevel::kHold, StopCause::kJointMismatch);
+  expect_stop([](SafetyInput& in) { in.health.joints.excess = 0.021; }, StopLevel::kWarn, StopCause::kJointRange);
+  expect_stop([](SafetyInput& in) { in.health.joints.excess = 0.101; }, StopLevel::kHold, StopCause::kJointRange);
+  expect_stop([](SafetyInput& in) { in.state_delay = 0.021; }, StopLevel::kWarn, StopCause::kStateDelay);
+  expect_stop([](SafetyInput& in) { in.state_delay = 0.051; }, StopLevel::kHold, StopCause::kStateDelay);
   expect_stop([](SafetyInput& in) { in.odometry_step = kNan; }, StopLevel::kHold, StopCause::kOdometryJump);
 }
 
@@ -239,10 +246,13 @@ TEST(SafetySignals, ALatePlannerMayUseHalfAndThenLess) {
 }
 
 TEST(SafetySignals, EachCauseHasItsOwnName) {
-  std::set<std::string_view> names;
-  for (std::size_t k = 0; k < kStopCauses; ++k)
+  std::set<std::string_view> names, texts;
+  for (std::size_t k = 0; k < kStopCauses; ++k) {
     EXPECT_TRUE(names.insert(stop_cause_name(static_cast<StopCause>(k))).second) << k;
+    EXPECT_TRUE(texts.insert(stop_cause_text(static_cast<StopCause>(k))).second) << k;
+  }
   EXPECT_EQ(stop_cause_name(StopCause::kExecutorAge), "executor_age");
+  EXPECT_EQ(stop_cause_name(StopCause::kJointRange), "joint_range");
 }
 
 }  // namespace
