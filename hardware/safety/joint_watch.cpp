@@ -107,7 +107,8 @@ void JointWatch::judge(bool learns) {
     const int j = static_cast<int>(k);
     if (joint.jumped) jump = j;
     if (joint.still >= kStillStates && std::abs(joint.target - joint.target_at_rest) > kTargetMoved) frozen = j;
-    if (!(std::abs(joint.off) <= kMismatch + kSpeedLag * joint.fastest)) mismatch = j;
+    const bool is_off = !(std::abs(joint.off) <= kMismatch + kSpeedLag * joint.fastest);
+    if (is_off) (joint.still >= kStillStates ? frozen : mismatch) = j;
     const double excess = *std::ranges::min_element(joint.excess);
     if (excess > doubts_.excess) {
       doubts_.excess = excess;

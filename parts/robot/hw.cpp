@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <iostream>
@@ -13,6 +14,7 @@
 #include "duet/hardware/dds/robot_side.h"
 #include "duet/hardware/guard/guard_loop.h"
 #include "duet/hardware/guard/guard_message.h"
+#include "duet/hardware/guard/identification.h"
 #include "duet/hardware/guard/person_input.h"
 #include "duet/hardware/guard/robot_connection.h"
 #include "duet/hardware/log/run_log.h"
@@ -35,7 +37,7 @@ struct HardwareArguments {
                       pose_socket = "duet-pose.socket", walker, walker_network;
   double seconds = 5.0;
   int velocity_port = 0;
-  bool lock_step = false;
+  bool lock_step = false, identify = false;
   ClipEpisodeArguments episode;
 };
 
@@ -64,7 +66,11 @@ std::optional<PersonInput> person_input(const RobotConfig& config, const Hardwar
   return PersonInput(DatagramSocket::at_path(arguments.person_socket), config.camera);
 }
 
-void listen_for(Session& session, const HardwareArguments& arguments, bool with_planner) {
+// Ten seconds unless somebody says otherwise: what identification takes.
+constexpr double kIdentifyFor = 10.0;
+
+void listen_for(Session& session, HardwareArguments arguments, bool with_planner) {
+  if (arguments.identify) arguments.seconds = std::max(arguments.seconds, kIdentifyFor);
   const RobotConfig config = read_robot_config(arguments.config);
   note(session,
        fmt::format("listens to {} for {} s; {}. Nothing is written to it: no writer is made.", where(config),
@@ -81,14 +87,26 @@ void listen_for(Session& session, const HardwareArguments& arguments, bool with_
   std::optional<PersonInput> person = person_input(config, arguments);
   std::optional<DatagramSocket> planner;
   if (with_planner) planner.emplace(DatagramSocket::at_path(arguments.socket));
+  std::optional<StandingIdentification> standing;
+  if (arguments.identify) standing.emplace(setup.limiter.robot);
   end_on_signals();
   const double begin = monotonic_seconds();
+  long seen = 0;
   run_guard(guard, side.connection(), planner ? &*planner : nullptr, setup.limiter.dt, [&](double now) {
     if (person) person->poll(now, guard);
     if (log) log->add(guard);
+    if (standing && guard.status().states > seen) standing->see(guard.reading());
+    seen = guard.status().states;
     return asked_to_end == 0 && now - begin < arguments.seconds;
   });
-  print(session, status_text(guard, monotonic_seconds() - begin), status_json(guard));
+  nlohmann::json status = status_json(guard);
+  std::string text = status_text(guard, monotonic_seconds() - begin);
+  if (guard.status().states > 0 && standing) {
+    const StandingFindings found = standing->findings();
+    status["standing"] = findings_json(found, *setup.limiter.robot);
+    text += "\n" + findings_text(found, *setup.limiter.robot);
+  }
+  print(session, text, status);
   if (guard.status().states == 0) throw MissingError(fmt::format("no state of {} has come", where(config)));
 }
 
@@ -358,6 +376,8 @@ void add_hardware(CLI::App& app, Session& session) {
   for (CLI::App* talks : {dry, arm, plan, stop}) add_socket(talks, *arguments);
   for (CLI::App* lasts : {check, dry, plan}) add_seconds(lasts, *arguments);
   for (CLI::App* logs : {check, dry}) logs->add_option("--log", arguments->log, "log to make (MCAP)");
+  check->add_flag("--identify", arguments->identify,
+                  "compare ten seconds of standing with the card: mass, centre of mass, IMU, zeros of the legs");
   arm->add_option("--log", arguments->log, "log to make (MCAP)")->required();
   arm->add_option("--velocity-port", arguments->velocity_port,
                   "UDP port of 127.0.0.1 that takes a twin's velocities (executor 'twin')")

@@ -202,7 +202,7 @@ TEST(FaultMatrix, ASpeedCountsAfterThreeStatesByTheJointsOwnLimit) {
 
 // The states of both arms change places, joint by joint.
 void exchange_arms(LowStateFrame& frame, bool reversed) {
-  const std::vector<std::vector<int>>& arms = test::g1()->roles.arms;
+  const auto& arms = test::g1()->roles.arms;
   const LowStateFrame before = frame;
   for (std::size_t k = 0; k < arms[0].size(); ++k)
     for (std::size_t side = 0; side < 2; ++side)
