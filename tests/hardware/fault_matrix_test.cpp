@@ -213,6 +213,7 @@ TwinOptions noisy_joints() {
   TwinOptions options;
   options.joint_noise = 0.002;
   options.joint_speed_noise = 0.1;
+  options.gyro_noise = 0.05;
   return options;
 }
 

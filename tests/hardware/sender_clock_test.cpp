@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -64,9 +65,10 @@ TEST(SenderDelay, ASenderWithOurClockHidesNoDelay) {
 double steady_delay(double unit, double delay, double seconds = 4.0) {
   StateDelay states;
   Random random(3, 4);
+  double received = 0.0;
   for (double sent = 0.0; sent < seconds; sent += 0.002) {
-    const double jitter = random.uniform(0.0, 0.004);
-    states.see(static_cast<std::uint32_t>(std::lround(sent / unit)), 70.0 + sent + jitter + (sent > 2.0 ? delay : 0.0));
+    received = std::max(received, 70.0 + sent + random.uniform(0.0, 0.004) + (sent > 2.0 ? delay : 0.0));
+    states.see(static_cast<std::uint32_t>(std::lround(sent / unit)), received);
   }
   return states.steady();
 }
