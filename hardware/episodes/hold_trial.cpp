@@ -128,7 +128,9 @@ class HoldRun {
     link_.twin().condition.gyro = cause_ == StopCause::kGyro && glitch ? 7.0 : 0.0;
     if (cause_ == StopCause::kLoopLate && !paused_) link_.pause(kGap);
     paused_ = true;
-    trouble.spoil = [this](LowStateFrame& frame) { spoil(frame.motor[robot_->roles.arms[0][kElbow]]); };
+    const bool is_of_a_joint = cause_ >= StopCause::kJointJump && cause_ <= StopCause::kJointRange;
+    if (is_of_a_joint)
+      trouble.spoil = [this](LowStateFrame& frame) { spoil(frame.motor[robot_->roles.arms[0][kElbow]]); };
   }
 
   // What an elbow reports.
