@@ -21,7 +21,7 @@ constexpr const char* kViewer = DUET_SOURCE_DIR "/viewer";
 
 bool packages_are_there() {
   for (const char* package : {"@mcap/core", "@foxglove/rosmsg", "@foxglove/rosmsg2-serialization", "fzstd"})
-    if (!std::filesystem::exists(std::string(kViewer) + "/node_modules/" + package)) return false;
+    if (!std::filesystem::exists(std::filesystem::path(kViewer) / "node_modules" / package)) return false;
   return std::system("command -v node >/dev/null 2>&1") == 0;
 }
 
