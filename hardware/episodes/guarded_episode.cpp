@@ -307,6 +307,13 @@ Pose GuardedWorld::to_odometry(const Pose& X_EB) const {
   return {R_OE * X_EB.R, p_OE_ + R_OE * X_EB.p};
 }
 
+HumanJoints GuardedWorld::to_odometry(const HumanJoints& p_E) const {
+  const Eigen::Quaterniond R_OE = yaw_rotation(yaw_OE_);
+  HumanJoints p_O;
+  for (int j = 0; j < kSmplJoints; ++j) p_O.col(j) = p_OE_ + R_OE * p_E.col(j).eval();
+  return p_O;
+}
+
 void GuardedWorld::take_state() {
   const Eigen::Quaterniond R_EO = yaw_rotation(-yaw_OE_);
   state_ = report_.robot;
@@ -319,8 +326,7 @@ void GuardedWorld::take_state() {
 
 void GuardedWorld::show_person(int tick) {
   if (!episode_.person || !episode_.person(tick, person_)) return;
-  const Eigen::Quaterniond R_OE = yaw_rotation(yaw_OE_);
-  for (int j = 0; j < kSmplJoints; ++j) person_.joints.col(j) = p_OE_ + R_OE * person_.joints.col(j).eval();
+  person_.joints = to_odometry(person_.joints);
   if (stand_off_ > 0.0) {
     Eigen::Vector3d away = person_.joints.col(0) - report_.robot.X_WB.p;
     away.z() = 0.0;
@@ -334,12 +340,9 @@ void GuardedWorld::show_person(int tick) {
 void GuardedWorld::move_person(const PointTracks& partner, int tick) {
   if (twin_ == nullptr) return;
   const Eigen::Quaterniond R_OE = yaw_rotation(yaw_OE_);
-  HumanJoints joints = partner_joints(partner, tick), velocities = partner_velocities(partner, tick, kTickRate);
-  for (int j = 0; j < kSmplJoints; ++j) {
-    joints.col(j) = p_OE_ + R_OE * joints.col(j).eval();
-    velocities.col(j) = R_OE * velocities.col(j).eval();
-  }
-  twin_->twin().physics()->move_person(joints, velocities);
+  HumanJoints velocities = partner_velocities(partner, tick, kTickRate);
+  for (int j = 0; j < kSmplJoints; ++j) velocities.col(j) = R_OE * velocities.col(j).eval();
+  twin_->twin().physics()->move_person(to_odometry(partner_joints(partner, tick)), velocities);
 }
 
 void GuardedWorld::take_contacts() {

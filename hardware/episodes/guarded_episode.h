@@ -108,6 +108,7 @@ class GuardedWorld final : public World {
   void take_state();
   void lay_world(const Pose& start);
   [[nodiscard]] Pose to_odometry(const Pose& X_EB) const;
+  [[nodiscard]] HumanJoints to_odometry(const HumanJoints& p_E) const;
 
   GuardedEpisode episode_;
   std::shared_ptr<const RobotModel> robot_;

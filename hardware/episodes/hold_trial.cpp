@@ -133,7 +133,7 @@ class HoldRun {
       trouble.spoil = [this](LowStateFrame& frame) { spoil(frame.motor[robot_->roles.arms[0][kElbow]]); };
   }
 
-  // What an elbow reports.
+  // The reading of an elbow.
   void spoil(MotorStateFrame& motor) {
     const bool lasts = time() < begin_ + setup_.seconds;
     if (lasts && cause_ == StopCause::kJointJump) motor.q = kFarAway;

@@ -43,7 +43,7 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-// What the floor does to a foot: the leg's torques are its weight's less that. g(q) = tau + J^T F at rest.
+// The floor's wrench on a foot: the leg's torques are its weight's less that. g(q) = tau + J^T F at rest.
 Wrench wrench_of_foot(const RobotModel& robot, const Kinematics& kinematics, const std::vector<int>& leg, int foot,
                       const Eigen::VectorXd& weight, const Eigen::VectorXd& tau) {
   Eigen::MatrixXd linear(3, 6 + robot.dof()), angular(3, 6 + robot.dof());

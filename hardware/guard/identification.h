@@ -1,4 +1,4 @@
-// What a robot that stands says of itself beside its card: mass and centre of mass by the torques of its legs, the lean
+// A standing robot measured beside its card: mass and centre of mass by the torques of its legs, the lean
 // of its IMU by its soles, zeros of its legs by the two soles. `duet hw check --identify`; docs/hardware.md,
 // "Identification". Nothing is commanded. One owner, one thread.
 #pragma once

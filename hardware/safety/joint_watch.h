@@ -11,7 +11,7 @@
 
 namespace duet {
 
-// What is wrong now; the joint is the first of the first of these that is true, -1 where none is.
+// The doubts of now; the joint is the first of the first of these that is true, -1 where none is.
 struct JointDoubts {
   bool jump = false;      // an angle went further than its joint can, and has not come back
   bool frozen = false;    // neither angle nor speed nor torque changes by a bit

@@ -149,15 +149,14 @@ void Limiter::admit(const MotionCommand* received, LimiterState& state, ClampCou
 void Limiter::choose(const LimiterInput& input, const LimiterState& state, ClampCounts& counts) {
   wanted_.root = state.has_good ? state.good.root : VelocityCommand{0.0, 0.0, 0.0, state.height.value};
   wanted_.q = state.good.q;
-  wanted_.share = std::isfinite(input.share) ? std::clamp(input.share, 0.0, 1.0) : 0.0;
+  wanted_.share_all(std::isfinite(input.share) ? std::clamp(input.share, 0.0, 1.0) : 0.0);
   count_if(wanted_.share < 1.0, counts, ClampReason::kHold);
-  wanted_.root_share = wanted_.arm_share = wanted_.share;
 }
 
 void Limiter::open_arms(const LimiterInput& input, ClampCounts& counts) {
   const Eigen::VectorXd& open = setup_.robot->neutral;
   wanted_.q = open;
-  wanted_.share = wanted_.root_share = wanted_.arm_share = 1.0;
+  wanted_.share_all(1.0);
   bool arms_are_open = true;
   for (const int joint : setup_.executed.joints)
     arms_are_open = arms_are_open && std::abs(input.state.q[joint] - open[joint]) < kOpen;
@@ -180,7 +179,7 @@ double Limiter::allowed_speed(double distance, double person_speed) const {
 void Limiter::keep_distance(const LimiterInput& input, const BodyGaps& gaps, ClampCounts& counts) {
   if (!setup_.person || input.release) return;
   if (input.person == nullptr || !input.odometry) {
-    wanted_.share = wanted_.root_share = wanted_.arm_share = 0.0;
+    wanted_.share_all(0.0);
     return count(counts, ClampReason::kPartnerUnknown);
   }
   const double measured = std::max(input.person_speed, 0.0);

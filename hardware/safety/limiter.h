@@ -156,6 +156,8 @@ class Limiter {
   struct Wanted {
     VelocityCommand root;
     Eigen::VectorXd q;
+    // Sets all three.
+    void share_all(double value) { share = root_share = arm_share = value; }
     double share = 1.0;                        // of all speeds
     double root_share = 1.0, arm_share = 1.0;  // of it, of those of root and arms
   };

@@ -49,7 +49,7 @@ enum class StopCause {
 };
 inline constexpr std::size_t kStopCauses = 28;
 std::string_view stop_cause_name(StopCause cause);  // "state_age", ...
-// What it means and what to look at, as a sentence for the screen; "" for kNone.
+// Its meaning and where to look, as a sentence for the screen; "" for kNone.
 std::string_view stop_cause_text(StopCause cause);
 
 inline constexpr double kNever = -std::numeric_limits<double>::infinity();

@@ -138,7 +138,7 @@ class TwinModel {
   void step_joints(double dt);
   void step_root(double dt);
   void step_body(double dt);
-  // Of an IMU with the axes S, which leans by `roll` about its x.
+  // For an IMU with the axes S, which leans by `roll` about its x.
   void write_imu(const Eigen::Quaterniond& R_WS, double roll, const Eigen::Vector3d& w_WS_S,
                  const Eigen::Vector3d& force_S, Random& random, ImuFrame& imu) const;
 

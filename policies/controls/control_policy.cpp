@@ -114,8 +114,8 @@ constexpr double kTurn = 0.7;                      // [rad/s]
 constexpr double kWaist = 0.5, kPitch = 0.35;      // of a bow [rad]
 constexpr double kWaveRate = 1.5;                  // [Hz]
 constexpr int kPlanned = 100;                      // ticks
-// Of a preset action: until its arms are where they act, that they are held there at most, that a wave lasts [s]; how
-// often hands are shaken [Hz].
+// Times of a preset action: until its arms are where they act, that they are held there at most, that a wave lasts [s];
+// how often hands are shaken [Hz].
 constexpr double kPresetUp = 0.8, kPresetHeld = 20.0, kPresetWave = 5.0, kShakeRate = 1.5;
 
 double smooth(double x) {

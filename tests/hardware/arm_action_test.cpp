@@ -3,12 +3,13 @@
 #include "duet/hardware/executors/arm_action.h"
 
 #include <algorithm>
-#include <deque>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "duet/hardware/executors/sport_executor.h"
 #include "duet/hardware/twin/fake_arms.h"
 #include "tests/hardware/limited_robot.h"
+#include "tests/hardware/memory_sport.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -19,20 +20,8 @@ constexpr double kDt = 0.005;
 JointCommand standing_stance() { return test::g1()->default_command(test::g1()->neutral); }
 
 // The stand-ins of the walking and of the arm actions, as `duet-g1-services --sport` has them, and their client.
-class MakersServices final : public SportWire {
+class MakersServices final : public test::MemorySport {
  public:
-  bool take(RpcResponse& response) override {
-    if (waiting_.empty()) return false;
-    response = waiting_.front();
-    waiting_.pop_front();
-    return true;
-  }
-  bool request(const RpcRequest& request) override {
-    requests.push_back(request);
-    const bool arm = service_of(request.call) == Service::kArm;
-    waiting_.push_back(arm ? arms.answer(request, now, walking.fsm()) : walking.answer(request, now));
-    return true;
-  }
   int arm_writers() override { return 1; }
   void open_arms() override { opened = true; }
   void close_arms() override {}
@@ -56,15 +45,16 @@ class MakersServices final : public SportWire {
     for (double left = seconds; left > 0.5 * kDt; left -= kDt) step();
   }
 
-  double now = 0.0;
   bool opened = false;
   FakeSport walking{standing_stance()};
   FakeArms arms{test::g1()};
   LowCommandFrame motors{};
-  std::vector<RpcRequest> requests;
 
  private:
-  std::deque<RpcResponse> waiting_;
+  std::optional<RpcResponse> answer(const RpcRequest& request) override {
+    const bool arm = service_of(request.call) == Service::kArm;
+    return arm ? arms.answer(request, now, walking.fsm()) : walking.answer(request, now);
+  }
 };
 
 TEST(ArmAction, HasTheMakersNumbersAndNames) {

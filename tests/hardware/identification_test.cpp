@@ -1,4 +1,4 @@
-// What a robot that stands says of itself: a load and a lean that were put there are found, through noisy sensors.
+// A standing robot beside its card: a load and a lean that were put there are found, through noisy sensors.
 #include "duet/hardware/guard/identification.h"
 
 #include <fmt/format.h>

@@ -1,4 +1,5 @@
-// What joints cannot do: each doubt where it belongs, and none where a robot moves, is noisy or loses states.
+// Joints that cannot be where they say: each doubt where it belongs, and none where a robot moves, is noisy or loses
+// states.
 #include "duet/hardware/safety/joint_watch.h"
 
 #include <gtest/gtest.h>
@@ -132,7 +133,7 @@ TEST(JointWatch, JointsThatStandStillToTheBitAreDoubted) {
   EXPECT_FALSE(robot.see().frozen);
 }
 
-// Of a robot without noise standing still says nothing, unless it was told to move.
+// A robot without noise may stand still: that says nothing, unless it was told to move.
 TEST(JointWatch, ARobotWithoutNoiseMayStandStill) {
   Swinging robot(0.0);
   robot.learns = true;

@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <deque>
 #include <limits>
 
 #include "duet/hardware/twin/fakes.h"
 #include "duet/hardware/wire/low_level_frame.h"
 #include "tests/hardware/guarded_twin.h"
+#include "tests/hardware/memory_sport.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -16,20 +16,9 @@ namespace {
 
 constexpr double kDt = 0.002;
 
-class MemorySport final : public SportWire {
+class SportAlone final : public test::MemorySport {
  public:
-  explicit MemorySport(FakeSport& service) : service_(service) {}
-  bool take(RpcResponse& response) override {
-    if (waiting_.empty()) return false;
-    response = waiting_.front();
-    waiting_.pop_front();
-    return true;
-  }
-  bool request(const RpcRequest& request) override {
-    requests.push_back(request);
-    if (alive) waiting_.push_back(service_.answer(request, now));
-    return true;
-  }
+  explicit SportAlone(FakeSport& service) : service_(service) {}
   int arm_writers() override { return others; }
   void open_arms() override { open = true; }
   void close_arms() override { open = false; }
@@ -43,15 +32,16 @@ class MemorySport final : public SportWire {
     return std::ranges::count_if(requests, [call](const RpcRequest& r) { return r.call == call; });
   }
 
-  double now = 0.0;
   int others = 0;
   bool open = false, alive = true;
-  std::vector<RpcRequest> requests;
   std::vector<LowCommandFrame> frames;
 
  private:
+  std::optional<RpcResponse> answer(const RpcRequest& request) override {
+    return alive ? std::optional(service_.answer(request, now)) : std::nullopt;
+  }
+
   FakeSport& service_;
-  std::deque<RpcResponse> waiting_;
 };
 
 JointCommand neutral_stance() { return test::g1()->default_command(test::g1()->neutral); }
@@ -76,7 +66,7 @@ struct SportTrial {
   }
 
   FakeSport service{neutral_stance()};
-  MemorySport wire{service};
+  SportAlone wire{service};
   SportExecutor executor{wire, kDt};
 };
 
@@ -92,7 +82,7 @@ TEST(SportExecutor, AsksNothingButItsStateBeforeItIsOpened) {
 
 TEST(SportExecutor, AMachineThatAnswersAndDoesNotWalkIsNotHeard) {
   FakeSport damped(neutral_stance(), 1);
-  MemorySport wire(damped);
+  SportAlone wire(damped);
   SportExecutor executor(wire, kDt);
   for (; wire.now < 1.0; wire.now += kDt) executor.poll(wire.now);
   EXPECT_GT(wire.asked(ServiceCall::kGetFsm), 5);
