@@ -49,7 +49,7 @@ std::vector<OptionSection> policy_option_sections() {
     sections.push_back({kind == PolicyKind::kOnnx ? "descriptor of an ONNX network" : "descriptor of a program",
                         rows_of(external_options(descriptor))});
   }
-  sections.push_back({"each of these, and replay", rows_of(common_policy_options())});
+  sections.push_back({"each of these, replay and controls", rows_of(common_policy_options())});
   return sections;
 }
 

@@ -14,6 +14,7 @@
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/experiment/suite_file/suite_key.h"
+#include "duet/policies/averaged_partner.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/hand_servo.h"
 #include "duet/robots/yaml_section.h"
@@ -179,11 +180,13 @@ void check_options_of(const SuitePolicy& policy) {
   std::vector<std::string> known;
   for (const PolicyOption& option : info.options) known.push_back(option.name);
   check_options("policy", policy.name, policy.options, known);
-  const auto servo = policy.options.find(kHandServo);
-  require(servo == policy.options.end() || servo->second == "false" || policy.name.find("servo") != std::string::npos,
-          "policy '{}': {} is on: expected a name that says `servo` ('{}+servo'), so that no table takes it for the "
-          "policy without",
-          policy.name, kHandServo, policy.name);
+  for (const auto& [option, word] : {std::pair{kHandServo, "servo"}, std::pair{kAverage, "average"}}) {
+    const auto given = policy.options.find(option);
+    require(given == policy.options.end() || given->second == "false" || policy.name.find(word) != std::string::npos,
+            "policy '{}': {} is on: expected a name that says `{}` ('{}+{}'), so that no table takes it for the policy "
+            "without",
+            policy.name, option, word, policy.name, word);
+  }
 }
 
 void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,

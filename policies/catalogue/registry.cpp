@@ -6,6 +6,7 @@
 #include "duet/core/field.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/policies/averaged_partner.h"
 #include "duet/policies/controls/control_policy.h"
 #include "duet/policies/dstar/dstar_policy.h"
 #include "duet/policies/dstar/retrieval.h"
@@ -44,23 +45,12 @@ constexpr PolicyRole kKnowsTheMotion = {ArmRole::kOracle, "knows the motion"};
 constexpr PolicyRole kStandsStill = {ArmRole::kControl, "stands still"};
 constexpr PolicyRole kScripted = {ArmRole::kControl, "scripted"};
 
-struct ControlOptions {
-  bool average = false;
-};
-
-const FieldTable<ControlOptions>& control_options() {
-  static const FieldTable<ControlOptions> table = {field<ControlOptions>(
-      {.name = "average", .meaning = "takes the partner where the last 0.24 s have them on average: a noisy one, too"},
-      &ControlOptions::average)};
-  return table;
-}
-
 PolicyInfo control_info(const std::string& name) {
   const auto found = std::ranges::find(control_scripts(), name, &ControlScript::name);
-  return {name, std::string(found->about), option_list<PolicyOption>(control_options())};
+  return {name, std::string(found->about), {}};
 }
-PolicyMaker named_control(const std::string& name, Robot robot, const PolicyOptions& options) {
-  return control_maker(name, std::move(robot), read_options("policy", name, control_options(), options).average);
+PolicyMaker named_control(const std::string& name, Robot robot, const PolicyOptions&) {
+  return control_maker(name, std::move(robot));
 }
 
 constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_files, kKnowsTheMotion},
@@ -133,44 +123,49 @@ const Entry& find_entry(const std::string& name) {
   throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));
 }
 
-struct ServoOption {
-  bool on = false;
+// What shipped policies and descriptors take beside their own options.
+struct CommonOptions {
+  bool average = false, servo = false;
 };
 
-const FieldTable<ServoOption>& servo_options() {
-  static const FieldTable<ServoOption> table = {field<ServoOption>(
-      {.name = kHandServo,
-       .meaning = "in tasks of hand at hand, the arm's last decimetres go to the partner's seen hand; "
-                  "the arm's name has to say `servo`"},
-      &ServoOption::on)};
+const FieldTable<CommonOptions>& common_options() {
+  static const FieldTable<CommonOptions> table = {
+      field<CommonOptions>(
+          {.name = kAverage,
+           .meaning = "takes the partner where the last 0.24 s have them on average: a noisy one, too; "
+                      "the arm's name has to say `average`"},
+          &CommonOptions::average),
+      field<CommonOptions>({.name = kHandServo,
+                            .meaning = "of no control; in tasks of hand at hand, the arm's last decimetres go to the "
+                                       "partner's seen hand; the arm's name has to say `servo`"},
+                           &CommonOptions::servo)};
   return table;
 }
 
-bool takes_servo(const Entry& entry) {
-  return entry.role.role != ArmRole::kControl && &entry != &kFunction && &entry != &kRegistered;
+bool takes(const Entry& entry, const PolicyOption& common) {
+  if (&entry == &kFunction || &entry == &kRegistered || entry.name == std::string_view("null")) return false;
+  return common.name != kHandServo || entry.role.role != ArmRole::kControl;
 }
 
 PolicyInfo info_of(const Entry& entry, const std::string& name) {
   PolicyInfo info = entry.info(name);
-  if (takes_servo(entry))
-    for (PolicyOption& option : common_policy_options()) info.options.push_back(std::move(option));
+  for (PolicyOption& option : common_policy_options())
+    if (takes(entry, option)) info.options.push_back(std::move(option));
   return info;
 }
 
-// Takes the servo's option out of those of a policy, which knows nothing of it.
-ServoOption take_servo(const std::string& name, PolicyOptions& options) {
+// Takes the common options out of those of a policy, which knows nothing of them.
+CommonOptions take_common(const Entry& entry, const std::string& name, PolicyOptions& options) {
   PolicyOptions taken;
-  if (auto node = options.extract(kHandServo)) taken.insert(std::move(node));
-  return read_options("policy", name, servo_options(), taken);
-}
-
-PolicyMaker servoed(PolicyMaker maker, Robot robot) {
-  return [maker = std::move(maker), robot = std::move(robot)] { return with_hand_servo(maker(), robot); };
+  for (const PolicyOption& option : common_policy_options())
+    if (takes(entry, option))
+      if (auto node = options.extract(option.name)) taken.insert(std::move(node));
+  return read_options("policy", name, common_options(), taken);
 }
 
 }  // namespace
 
-std::vector<PolicyOption> common_policy_options() { return option_list<PolicyOption>(servo_options()); }
+std::vector<PolicyOption> common_policy_options() { return option_list<PolicyOption>(common_options()); }
 
 std::vector<PolicyInfo> policies() {
   std::vector<PolicyInfo> infos;
@@ -203,7 +198,7 @@ PolicyRole policy_role(const std::string& name) {
 LoadedFiles policy_files(const std::string& name, const PolicyOptions& options) {
   const Entry& entry = find_entry(name);
   PolicyOptions own = options;
-  if (takes_servo(entry)) take_servo(name, own);
+  take_common(entry, name, own);
   return entry.files(name, own);
 }
 
@@ -214,9 +209,14 @@ PolicyMaker policy_maker(const std::string& name, Robot robot, const PolicyOptio
   for (const PolicyOption& option : info.options) known.push_back(option.name);
   check_options("policy", name, options, known);
   PolicyOptions own = options;
-  const bool servo = takes_servo(entry) && take_servo(name, own).on;
+  const CommonOptions common = take_common(entry, name, own);
   PolicyMaker maker = entry.maker(name, robot, own);
-  return servo ? servoed(std::move(maker), std::move(robot)) : maker;
+  if (!common.average && !common.servo) return maker;
+  return [maker = std::move(maker), robot = std::move(robot), common] {
+    std::unique_ptr<Policy> policy = maker();
+    if (common.servo) policy = with_hand_servo(std::move(policy), robot);
+    return common.average ? with_averaged_partner(std::move(policy)) : std::move(policy);
+  };
 }
 
 std::unique_ptr<Policy> make_policy(const std::string& name, Robot robot, const PolicyOptions& options) {

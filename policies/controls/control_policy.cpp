@@ -139,12 +139,11 @@ std::vector<std::string> control_names() {
   return names;
 }
 
-PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot, bool averages) {
+PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot) {
   require(robot != nullptr, "policy '{}' needs a robot", name);
-  ControlScript script = control_named(name);
-  script.averages = averages;
+  const ControlScript& script = control_named(name);
   static_cast<void>(ControlPolicy(robot, script));  // a robot that does not fit is found here
-  return [robot = std::move(robot), script] { return std::make_unique<ControlPolicy>(robot, script); };
+  return [robot = std::move(robot), &script] { return std::make_unique<ControlPolicy>(robot, script); };
 }
 
 ControlPolicy::ControlPolicy(std::shared_ptr<const RobotModel> robot, const ControlScript& script)
@@ -193,12 +192,7 @@ Anchors ControlPolicy::act(const Observation& observation) {
 }
 
 std::vector<Reference> ControlPolicy::plan(const Observation& observation) {
-  ObservationFrame frame = observation.now();
-  if (script_.averages) {
-    frame.partner.setZero();
-    for (const ObservationFrame& seen : observation.history)
-      frame.partner += seen.partner / static_cast<double>(observation.history.size());
-  }
+  const ObservationFrame& frame = observation.now();
   const Place where = place(frame);
   partner_.look(frame);
   if (!awake_) watch(frame, observation.tick);

@@ -33,7 +33,6 @@ struct ControlScript {
   bool embraces = false;                           // both arms are opened, and close where it has come near
   bool mirrors = false;                            // both arms and the trunk do as the partner's
   bool told = false;                               // does what its task's row in the source says
-  bool averages = false;  // takes the partner where the last kHistoryFrames have them on average
   bool preset = false;  // by the clock alone, as a maker's arm action: a wave and a kiss end, what touches is held 20 s
 };
 
@@ -45,8 +44,7 @@ bool is_control(std::string_view policy);
 std::vector<std::string> control_names();
 
 // Throws std::invalid_argument for a name that is none and for a robot without arms (card: roles.arms, tracks).
-// `averages`: as ControlScript.
-PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot, bool averages = false);
+PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot);
 
 class ControlPolicy final : public Policy {
  public:

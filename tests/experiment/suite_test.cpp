@@ -148,16 +148,21 @@ TEST(Suite, ControllersThatAreNotOnesAreRefused) {
 }
 
 // Rows and tables tell policies apart by their names.
-TEST(Suite, APolicyWithTheHandServoSaysSoInItsName) {
-  const auto named = [](const std::string& name, const std::string& servo) {
+TEST(Suite, APolicyWithACommonOptionSaysSoInItsName) {
+  const auto named = [](const std::string& name, const std::string& option) {
     std::string yaml = kMinimal;
-    return yaml.replace(yaml.find("[replay]"), 8,
-                        "[{name: " + name + ", use: replay, options: {hand_servo: " + servo + "}}]");
+    return yaml.replace(yaml.find("[replay]"), 8, "[{name: " + name + ", use: replay, options: {" + option + "}}]");
   };
-  EXPECT_NO_THROW(parse_suite(named("replay+servo", "true"), "s.yaml"));
-  EXPECT_NO_THROW(parse_suite(named("replay", "false"), "s.yaml"));
-  EXPECT_THAT(test::thrown_message<InputError>([&] { parse_suite(named("replay", "true"), "s.yaml"); }),
+  EXPECT_NO_THROW(parse_suite(named("replay+servo", "hand_servo: true"), "s.yaml"));
+  EXPECT_NO_THROW(parse_suite(named("replay+servo+average", "hand_servo: true, average: true"), "s.yaml"));
+  EXPECT_NO_THROW(parse_suite(named("replay", "hand_servo: false, average: false"), "s.yaml"));
+  const auto refusal = [&](const std::string& option) {
+    return test::thrown_message<InputError>([&] { parse_suite(named("replay", option), "s.yaml"); });
+  };
+  EXPECT_THAT(refusal("hand_servo: true"),
               HasSubstr("policy 'replay': hand_servo is on: expected a name that says `servo` ('replay+servo')"));
+  EXPECT_THAT(refusal("average: true"),
+              HasSubstr("policy 'replay': average is on: expected a name that says `average` ('replay+average')"));
 }
 
 std::string with_synth(const std::string& synth, const std::string& tasks = "[handshake, wave]") {
