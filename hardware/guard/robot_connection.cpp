@@ -92,6 +92,22 @@ const Schema<LcmPlace>& lcm_schema() {
   return schema;
 }
 
+const Schema<NetworkPlace>& network_schema() {
+  using P = NetworkPlace;
+  static const Schema<P> schema = {required_key({"bind"}, &P::bind), required_key({"key"}, &P::key)};
+  return schema;
+}
+
+void read_network(const std::string& file, const YamlSection& top, RobotConfig& config) {
+  read_mapping(file, top.node("network"), "network", network_schema(), config.network);
+  try {
+    (void)network_address(config.network.bind);
+  } catch (const std::invalid_argument& error) {
+    top.fail(top.line("network"), fmt::format("key 'bind': {}", error.what()));
+  }
+  config.has_network = true;
+}
+
 void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& config) {
   const YamlSection section(file, node, "camera", {"position", "quat_wxyz", "latency"});
   constexpr double kFarthest = 2.0;  // of a camera from the base [m]
@@ -115,9 +131,10 @@ void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& c
 }  // namespace
 
 RobotConfig parse_robot_config(const std::string& text, const std::string& file) {
-  const YamlSection top(file, parse_yaml(text, file), "robot",
-                        {"schema", "robot", "interface", "domain", "mode_machine", "allow_motion", "twin", "person",
-                         "limits", "touches", "contact_limits", "executor", "odometry", "arm_action", "lcm", "camera"});
+  const YamlSection top(
+      file, parse_yaml(text, file), "robot",
+      {"schema", "robot", "interface", "domain", "mode_machine", "allow_motion", "twin", "person", "limits", "touches",
+       "contact_limits", "executor", "odometry", "arm_action", "lcm", "camera", "network"});
   top.require_schema(kRobotSchema);
   RobotConfig config;
   config.permission = {.allow_motion = false,
@@ -134,6 +151,7 @@ RobotConfig parse_robot_config(const std::string& text, const std::string& file)
   read_executor(top, config);
   if (top.has("lcm")) read_mapping(file, top.node("lcm"), "lcm", lcm_schema(), config.lcm);
   if (top.has("camera")) read_camera(file, top.node("camera"), config);
+  if (top.has("network")) read_network(file, top, config);
   try {
     config.twin ? check_twin_place(config.place()) : check_place(config.place());
   } catch (const std::invalid_argument& error) {

@@ -66,6 +66,12 @@ class RobotConnection final : public RobotWire {
 // The configuration of one robot or twin (YAML, docs/hardware.md, "Configuration"): what is allowed, where it is, how
 // much slower or further away than the defaults it has to be.
 
+// Where sealed datagrams are received (hardware/guard/network_door.h).
+struct NetworkPlace {
+  std::string bind;  // "HOST:PORT" of this computer
+  std::string key;   // path of the key's file
+};
+
 struct RobotConfig {
   MotionPermission permission;
   bool twin = false;
@@ -79,6 +85,8 @@ struct RobotConfig {
   LcmPlace lcm;            // of HOMIE's processes
   CameraMount camera;      // what a person's joints come in
   bool has_camera = false;
+  NetworkPlace network;  // where planners and estimators of other computers reach the guard
+  bool has_network = false;
 
   [[nodiscard]] DdsPlace place() const { return {permission.domain, permission.interface}; }
 };

@@ -16,6 +16,7 @@
 #include "duet/hardware/safety/safety_machine.h"
 #include "duet/hardware/wire/datagram_socket.h"
 #include "duet/hardware/wire/robot_wire.h"
+#include "duet/hardware/wire/sealed_datagram.h"
 #include "duet/hardware/wire/sender_clock.h"
 
 namespace duet {
@@ -49,12 +50,13 @@ struct GuardStatus {
   ClampCounts clamps{};
   ContactReading contact;
   long ticks = 0, states = 0, checksum_faults = 0, tick_faults = 0, number_faults = 0;
-  long old_messages = 0;   // of planner or perception, dropped
-  long restarts = 0;       // of planner, perception and odometry: streams that were taken again after a pause
-  long bad_messages = 0;   // of perception: not finite, or a person who jumped
-  PersonCounts person{};   // estimates of a person, by what became of them
-  bool received = false;   // a planner's command was handed to the limiter
-  bool restarted = false;  // the limiter began anew, from
+  long old_messages = 0;    // of planner or perception, dropped
+  long restarts = 0;        // of planner, perception and odometry: streams that were taken again after a pause
+  long bad_messages = 0;    // of perception: not finite, or a person who jumped
+  PersonCounts person{};    // estimates of a person, by what became of them
+  NetworkCounts network{};  // datagrams from other computers, the same
+  bool received = false;    // a planner's command was handed to the limiter
+  bool restarted = false;   // the limiter began anew, from
   Eigen::VectorXd restart_q;
   bool took_state = false;  // a state came in this tick, whole or not
   LowStateFrame state_frame{};
@@ -74,6 +76,8 @@ class RobotGuard {
   void receive(const PersonMessage& message, double now);
   // Counts an estimate, and what became of it.
   void note_estimate(PersonFault fault) { ++status_.person[static_cast<std::size_t>(fault)]; }
+  // What came over the network so far.
+  void note_network(const NetworkCounts& counts) { status_.network = counts; }
   void receive(const OdometrySample& sample);
   void receive(const BatteryReading& battery, double now);
   // Notes that the executor of the commands was heard of at `at`.

@@ -83,6 +83,10 @@ std::string known(double value, const char* unit, int digits) {
 
 std::string estimate_name(std::size_t fault) { return fault == 0 ? "used" : std::string(kPersonFaultNames[fault]); }
 
+std::string datagram_name(std::size_t refusal) {
+  return refusal == 0 ? "taken" : std::string(kSealRefusalNames[refusal]);
+}
+
 void fill_health(const RobotGuard& guard, GuardHealth& health) {
   const GuardStatus& status = guard.status();
   const SafetyInput& input = status.input;
@@ -114,6 +118,7 @@ void fill_health(const RobotGuard& guard, GuardHealth& health) {
   health.old_messages = status.old_messages;
   health.bad_messages = status.bad_messages;
   health.person = status.person;
+  health.network = status.network;
   health.restarts = status.restarts;
 }
 
@@ -161,6 +166,7 @@ nlohmann::json health_json(const HealthMessage& message) {
   for (const HealthNumber& number : kNumbers) json[number.name] = number_or_null(message.health.*number.value);
   for (const HealthCount& count : kCounts) json[count.name] = message.health.*count.value;
   for (std::size_t k = 0; k < kPersonFaults; ++k) json["estimates"][estimate_name(k)] = message.health.person[k];
+  for (std::size_t k = 0; k < kSealRefusals; ++k) json["network"][datagram_name(k)] = message.health.network[k];
   return json;
 }
 
@@ -184,6 +190,9 @@ HealthMessage parse_health(std::string_view text, const std::string& name) {
     if (json.contains("estimates"))  // not in logs of before
       for (std::size_t k = 0; k < kPersonFaults; ++k)
         message.health.person[k] = count_from(json["estimates"].at(estimate_name(k)), name);
+    if (json.contains("network"))
+      for (std::size_t k = 0; k < kSealRefusals; ++k)
+        message.health.network[k] = count_from(json["network"].at(datagram_name(k)), name);
   } catch (const nlohmann::json::exception& error) {  // "[json.exception.out_of_range.403] key 'tilt' not found"
     const std::string_view what = error.what();
     throw InputError(fmt::format("{}: the health of a guard: {}", name, what.substr(what.find("] ") + 2)));
@@ -210,6 +219,8 @@ std::string health_text(const HealthMessage& message) {
   const std::string estimates = person_counts_text(h.person);
   text += fmt::format("  person: {}; {:.0f} % of all speeds{}\n", known(h.distance, "m away", 2), 100.0 * h.share,
                       estimates.empty() ? "" : "; " + estimates);
+  if (const std::string network = network_counts_text(h.network); !network.empty())
+    text += fmt::format("  {}\n", network);
   text += fmt::format("  tracking: {}{}\n", known(h.tracking, "rad at most off a target", 3),
                       message.tracking_joint.empty() ? "" : fmt::format(" ({})", message.tracking_joint));
   text += fmt::format(

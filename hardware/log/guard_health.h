@@ -32,8 +32,9 @@ struct GuardHealth {
   int doubtful_joint = -1;                           // that cannot be where its states say; -1: none
   long ticks = 0, states = 0, checksum_faults = 0, tick_faults = 0, number_faults = 0;
   long old_messages = 0, bad_messages = 0, restarts = 0;
-  long left_out = 0;      // ticks that the log has no room for
-  PersonCounts person{};  // estimates of a person, by what became of them
+  long left_out = 0;        // ticks that the log has no room for
+  PersonCounts person{};    // estimates of a person, by what became of them
+  NetworkCounts network{};  // datagrams from other computers, the same
 };
 
 struct HealthMessage {
@@ -46,6 +47,9 @@ struct HealthMessage {
 
 // The name of a count of estimates in messages: "used", "far", ...
 std::string estimate_name(std::size_t fault);
+
+// "taken", "forged", ...
+std::string datagram_name(std::size_t refusal);
 
 // All that the guard knows but distance, tracking, `late` and `left_out`. No allocation.
 void fill_health(const RobotGuard& guard, GuardHealth& health);

@@ -78,7 +78,8 @@ class LogMessages {
     event.dropped = number("dropped");
     event.restarts = number("restarts");
     event.refused = number("refused");
-    if (event.refused > 0) event.why = word("why");
+    event.kept_out = number("kept_out");
+    if (event.refused > 0 || event.kept_out > 0) event.why = word("why");
     if (parts_.event) parts_.event(event);
   }
 

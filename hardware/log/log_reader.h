@@ -20,6 +20,7 @@ struct LogEvent {
   std::string text;      // as it stands in the log
   long refused = 0;      // estimates of a person
   std::string why = {};  // they were
+  long kept_out = 0;     // datagrams from other computers, and why
 };
 
 // A function for each kind of message; those without a function are passed over. A tick comes before the frames of

@@ -182,8 +182,9 @@ void RunLog::add_channels() {
   writer_.add({kSetupChannel, "guard/setup", "json", "", "", ""});
   writer_.add({kTickChannel, "guard/tick", kTickEncoding, "", "", ""});
   writer_.add({kFrameChannel, "rt/lowcmd", "cdr", "unitree_hg/msg/LowCmd", "ros2msg", kCommandSchema});
-  json_channel(kEventChannel, "guard/events", "duet.GuardEvent",
-               {{"state", ""}, {"cause", ""}, {"dropped", 0}, {"restarts", 0}, {"refused", 0}, {"why", ""}});
+  json_channel(
+      kEventChannel, "guard/events", "duet.GuardEvent",
+      {{"state", ""}, {"cause", ""}, {"dropped", 0}, {"restarts", 0}, {"refused", 0}, {"kept_out", 0}, {"why", ""}});
   writer_.add({kStateChannel, "rt/lowstate", "cdr", "unitree_hg/msg/LowState", "ros2msg", kStateSchema});
   json_channel(kHealthChannel, "guard/health", "duet.GuardHealth", health_json({}));
   json_channel(kLimiterChannel, "guard/limiter", "duet.LimiterTick", limiter_json({}, setup_.limiter, 0.0, {}));
@@ -260,7 +261,8 @@ void RunLog::write_slot(const Slot& slot) {
   if (ticks_to_health_-- <= 0) write_plain(slot, time);
 }
 
-// An event for each reason for which estimates of a person were refused since the last one.
+// An event for each reason for which estimates of a person, or datagrams from other computers, were refused since the
+// last one.
 void RunLog::write_refusals(const Slot& slot) {
   const PersonCounts& counts = slot.health.person;
   for (std::size_t k = 1; k < kPersonFaults; ++k) {
@@ -270,6 +272,14 @@ void RunLog::write_refusals(const Slot& slot) {
     refusals_at_ = slot.tick.now;
   }
   told_person_ = counts;
+  const NetworkCounts& network = slot.health.network;
+  for (std::size_t k = 1; k < kSealRefusals; ++k) {
+    if (network[k] == told_network_[k]) continue;
+    write_event(nanoseconds(slot.tick.now), slot.state, slot.cause, "kept_out", network[k] - told_network_[k],
+                kSealRefusalNames[k]);
+    refusals_at_ = slot.tick.now;
+  }
+  told_network_ = network;
 }
 
 void RunLog::write_setup(std::uint64_t time) {
@@ -308,7 +318,8 @@ void RunLog::write_json(std::uint16_t channel, std::uint64_t time, const nlohman
 }
 
 // A change of state, or that `n` ticks are not in the log here ("dropped"), or `n` streams were taken again after a
-// pause ("restarts"), or `n` estimates of a person were refused, and `why` ("refused").
+// pause ("restarts"), or `n` estimates of a person were refused, and `why` ("refused"), or
+// datagrams from other computers ("kept_out").
 void RunLog::write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted, long n,
                          std::string_view why) {
   nlohmann::json event = {{"state", safety_state_name(state)}, {"cause", stop_cause_name(cause)}};

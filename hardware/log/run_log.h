@@ -116,6 +116,7 @@ class RunLog {
   std::atomic<long> dropped_ = 0;
   long told_ = 0, told_restarts_ = 0;  // by a slot
   PersonCounts told_person_{};         // by an event
+  NetworkCounts told_network_{};       // the same
   double refusals_at_ = kNever;        // of that event, by the guard's clock [s]
   Slot last_ = {};                     // that was written
   bool began_ = false;                 // a slot was written

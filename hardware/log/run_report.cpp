@@ -139,7 +139,9 @@ class ReportGatherer {
     if (event.dropped > 0) add_fault("dropped", at, event.dropped);
     if (event.restarts > 0) add_fault("restarts", at, event.restarts);
     if (event.refused > 0) add_fault("estimates refused: " + event.why, at, event.refused);
-    if (event.dropped > 0 || event.restarts > 0 || event.refused > 0 || event.state == state_) return;
+    if (event.kept_out > 0) add_fault("from the network, refused: " + event.why, at, event.kept_out);
+    if (event.dropped > 0 || event.restarts > 0 || event.refused > 0 || event.kept_out > 0 || event.state == state_)
+      return;
     end_span();
     state_ = event.state;
     report_.spans.push_back({at, 0.0, event.state, event.cause});

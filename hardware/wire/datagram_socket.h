@@ -1,5 +1,6 @@
 // Datagrams between processes of one machine: a Unix socket at a path that only its owner may use, or UDP on the
-// loopback address. Nothing blocks but wait(). One owner, one thread.
+// loopback address; and UDP between machines, which carries nothing that is not sealed (hardware/wire/
+// sealed_datagram.h). Nothing blocks but wait(). One owner, one thread.
 #pragma once
 
 #include <cstddef>
@@ -9,6 +10,15 @@
 #include <string>
 
 namespace duet {
+
+// An IPv4 address and a port, both in the host's byte order.
+struct NetworkAddress {
+  std::uint32_t host = 0;
+  std::uint16_t port = 0;
+  bool operator==(const NetworkAddress&) const = default;
+};
+// Of "HOST:PORT"; a host's name is looked up. Throws std::invalid_argument.
+NetworkAddress network_address(const std::string& text);
 
 class DatagramSocket {
  public:
@@ -20,6 +30,9 @@ class DatagramSocket {
   // Receives at a UDP port of 127.0.0.1 (0: any that is free); sends to one.
   static DatagramSocket at_port(std::uint16_t port);
   static DatagramSocket to_port(std::uint16_t port);
+  // Receives at a UDP address of this machine, whoever sends; sends to one, and receives what comes from there.
+  static DatagramSocket at_address(const NetworkAddress& address);
+  static DatagramSocket to_address(const NetworkAddress& address);
   ~DatagramSocket();
   DatagramSocket(DatagramSocket&& other) noexcept;
   DatagramSocket& operator=(DatagramSocket&& other) = delete;
@@ -28,6 +41,9 @@ class DatagramSocket {
   bool send(std::span<const std::byte> datagram);
   // Its length, 0 where none waits. A longer one than `buffer` is cut.
   std::size_t receive(std::span<std::byte> buffer);
+  // The same of at_address, which knows where it came from, and answers there.
+  std::size_t receive_from(std::span<std::byte> buffer, NetworkAddress& from);
+  bool send_to(const NetworkAddress& address, std::span<const std::byte> datagram);
   // Until a datagram waits, so many seconds at most; false where none does.
   [[nodiscard]] bool wait(double most) const;
   [[nodiscard]] std::uint16_t port() const;  // of at_port
@@ -37,6 +53,21 @@ class DatagramSocket {
 
   int descriptor_ = -1;
   std::string path_;  // that is removed with it
+};
+
+// Whoever receives at a path, now or later: looks for them again ten times a second while nobody does.
+class LocalPeer {
+ public:
+  explicit LocalPeer(std::string path) : path_(std::move(path)) {}
+  // `now`: by any clock [s]. False where nobody takes it, or their queue is full.
+  bool send(std::span<const std::byte> datagram, double now);
+  // Whether somebody was there when it last looked; looks again as send() does.
+  bool is_there(double now);
+
+ private:
+  std::string path_;
+  std::optional<DatagramSocket> to_;
+  double looks_at_ = 0.0;
 };
 
 // The one rule for the sequence numbers of what comes over a socket, be it a planner, a tracker or who estimates the

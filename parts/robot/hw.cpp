@@ -15,6 +15,7 @@
 #include "duet/hardware/guard/guard_loop.h"
 #include "duet/hardware/guard/guard_message.h"
 #include "duet/hardware/guard/identification.h"
+#include "duet/hardware/guard/network_door.h"
 #include "duet/hardware/guard/person_input.h"
 #include "duet/hardware/guard/robot_connection.h"
 #include "duet/hardware/log/run_log.h"
@@ -66,6 +67,13 @@ std::optional<PersonInput> person_input(const RobotConfig& config, const Hardwar
   return PersonInput(DatagramSocket::at_path(arguments.person_socket), config.camera);
 }
 
+// Null where the configuration names no network. Its thread has no priority, if nobody asked for it yet.
+std::unique_ptr<OpenDoor> open_door(const RobotConfig& config, const HardwareArguments& arguments) {
+  if (!config.has_network) return nullptr;
+  return std::make_unique<OpenDoor>(network_address(config.network.bind), read_network_key(config.network.key),
+                                    GuardSockets{arguments.socket, arguments.person_socket, arguments.pose_socket});
+}
+
 // Ten seconds unless somebody says otherwise: what identification takes.
 constexpr double kIdentifyFor = 10.0;
 
@@ -81,6 +89,7 @@ void listen_for(Session& session, HardwareArguments arguments, bool with_planner
   std::unique_ptr<RunLog> log;  // its thread has no priority
   if (!arguments.log.empty())
     log = std::make_unique<RunLog>(arguments.log, setup, with_planner ? status_sender(arguments.socket) : nullptr);
+  const std::unique_ptr<OpenDoor> door = open_door(config, arguments);
   note(session, real_time_text());
   RobotSide side(config, side_options(arguments, false));
   RobotGuard guard(setup, side.connection(), side.executor());
@@ -94,6 +103,7 @@ void listen_for(Session& session, HardwareArguments arguments, bool with_planner
   long seen = 0;
   run_guard(guard, side.connection(), planner ? &*planner : nullptr, setup.limiter.dt, [&](double now) {
     if (person) person->poll(now, guard);
+    if (door) guard.note_network(door->counts());
     if (log) log->add(guard);
     if (standing && guard.status().states > seen) standing->see(guard.reading());
     seen = guard.status().states;
@@ -182,6 +192,10 @@ class ArmedRun {
     if (refused > told_refused_)
       waits += fmt::format("{}{}", waits.empty() ? "" : "; ", person_counts_text(status.person));
     told_refused_ = refused;
+    const long kept_out = refused_datagrams(status.network);
+    if (kept_out > told_kept_out_)
+      waits += fmt::format("{}{}", waits.empty() ? "" : "; ", network_counts_text(status.network));
+    told_kept_out_ = kept_out;
     if (waits.empty()) return;
     said_at_ = status.input.now;
     note(session_, fmt::format("{} ({})", safety_state_name(last_), waits));
@@ -208,8 +222,8 @@ class ArmedRun {
   RunLog& log_;
   ArmingFacts facts_;
   SafetyState last_ = SafetyState::kOffline;
-  double said_at_ = 0.0;   // by the guard's clock [s]
-  long told_refused_ = 0;  // estimates of a person
+  double said_at_ = 0.0;                       // by the guard's clock [s]
+  long told_refused_ = 0, told_kept_out_ = 0;  // estimates of a person; datagrams from other computers
   bool armed_ = false;
   std::string refusal_;
 };
@@ -248,6 +262,7 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   facts.remote_key_held = true;
   if (const std::string why = arming_refusal(facts); !why.empty()) throw InputError("not armed: " + why);
   DatagramSocket planner = DatagramSocket::at_path(arguments.socket);
+  const std::unique_ptr<OpenDoor> door = open_door(config, arguments);
   if (arguments.lock_step)
     ask_for_sharp_timers();
   else
@@ -262,6 +277,7 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   end_on_signals();
   const auto after_tick = [&](double now) {
     if (person) person->poll(now, guard);
+    if (door) guard.note_network(door->counts());
     return run.go_on();
   };
   const auto in_time = [&](double now) {
@@ -391,6 +407,7 @@ void add_hardware(CLI::App& app, Session& session) {
         ->capture_default_str();
   }
   add_play_partner(*hardware, session);
+  add_network(*hardware, session);
   add_see(*hardware, session);
   add_calibrate(*hardware, session);
   add_holds(*hardware, session);

@@ -44,6 +44,9 @@ void add_log_commands(CLI::App& hardware, Session& session);
 // Tells `duet hw status`, where it waits beside the guard's socket, how the guard is: 10 times a second.
 RunLog::Watch status_sender(const std::string& socket);
 
+// `duet hw key` and `duet hw link`: a guard on another computer.
+void add_network(CLI::App& hardware, Session& session);
+
 // `duet hw see`: recorded estimates of a person into guard and policy.
 void add_see(CLI::App& hardware, Session& session);
 // `duet hw calibrate`: the camera on the body from a person at marked places.

@@ -71,8 +71,9 @@ std::string in_doubt_text(const RobotGuard& guard) {
 
 nlohmann::json status_json(const RobotGuard& guard) {
   const GuardStatus& status = guard.status();
-  nlohmann::json clamps = nlohmann::json::object(), estimates = nlohmann::json::object();
+  nlohmann::json clamps = nlohmann::json::object(), estimates = nlohmann::json::object(), network;
   for (std::size_t k = 0; k < kPersonFaults; ++k) estimates[estimate_name(k)] = status.person[k];
+  for (std::size_t k = 0; k < kSealRefusals; ++k) network[datagram_name(k)] = status.network[k];
   for (std::size_t k = 0; k < kClampReasons; ++k) clamps[std::string(kClampNames[k])] = status.clamps[k];
   return {{"state", safety_state_name(status.safety.state)},
           {"cause", stop_cause_name(status.safety.cause)},
@@ -84,22 +85,23 @@ nlohmann::json status_json(const RobotGuard& guard) {
           {"old_messages", status.old_messages},
           {"restarts", status.restarts},
           {"estimates", estimates},
+          {"network", network},
           {"clamps", clamps}};
 }
 
 std::string status_text(const RobotGuard& guard, double seconds) {
   const GuardStatus& status = guard.status();
   const RobotHealth& health = status.input.health;
-  const std::string estimates = person_counts_text(status.person);
+  const std::string estimates = person_counts_text(status.person), network = network_counts_text(status.network);
   return fmt::format(
       "{}\n  {} states in {:.1f} s; {} with a wrong checksum, {} old, {} not finite\n  tilt {:.3f} rad, hottest casing "
-      "{:.0f} and winding {:.0f} degrees C, charge {:.0f} %, remote control {}\n  other writers of commands: {}{}\n  "
+      "{:.0f} and winding {:.0f} degrees C, charge {:.0f} %, remote control {}\n  other writers of commands: {}{}{}\n  "
       "clamps: {}{}",
       readiness(guard), status.states, seconds, status.checksum_faults, status.tick_faults, status.number_faults,
       health.tilt, health.casing, health.winding, health.charge,
       status.input.remote_at == kNever ? "not heard" : "heard, " + keys_text(guard.reading().remote),
       status.input.foreign_writer ? "yes" : "none", estimates.empty() ? "" : "\n  person: " + estimates,
-      clamp_text(status.clamps), reading_text(guard));
+      network.empty() ? "" : "\n  " + network, clamp_text(status.clamps), reading_text(guard));
 }
 
 namespace {

@@ -55,6 +55,7 @@ TEST(GuardHealth, IsReadAsItWasWritten) {
   message.health.planner_age = 0.7;
   message.health.distance = 0.456;
   message.health.restarts = 3;
+  message.health.network = {5, 0, 0, 0, 7};
   message.missing = "remote_age";
   message.tracking_joint = "left_elbow_joint";
   message.next = std::string(next_key(SafetyState::kHold, true));
@@ -67,6 +68,8 @@ TEST(GuardHealth, IsReadAsItWasWritten) {
   EXPECT_THAT(text, HasSubstr("planner 700 ms, person never"));
   EXPECT_THAT(text, HasSubstr("charge not known"));
   EXPECT_THAT(text, HasSubstr("person: 0.46 m away; "));
+  EXPECT_EQ(again.health.network, message.health.network);
+  EXPECT_THAT(text, HasSubstr("network: 5 taken, 7 refused: 7 forged (another key, or altered on its way)"));
 }
 
 TEST(GuardHealth, RefusesWhatIsNoHealth) {

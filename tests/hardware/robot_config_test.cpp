@@ -67,6 +67,19 @@ TEST(RobotConfig, AWordOfExecutorOdometryAndCameraIsTaken) {
   EXPECT_FALSE(guard_setup(config, true).rules.executor_answers);
 }
 
+TEST(RobotConfig, ANetworkIsAnAddressAndAKey) {
+  EXPECT_FALSE(parse_robot_config(kTwin, "twin.yaml").has_network);
+  const RobotConfig config =
+      parse_robot_config(std::string(kTwin) + "network: {bind: 127.0.0.1:15100, key: guard.key}\n", "twin.yaml");
+  EXPECT_TRUE(config.has_network);
+  EXPECT_EQ(config.network.bind, "127.0.0.1:15100");
+  EXPECT_EQ(config.network.key, "guard.key");
+  for (const char* text : {"{bind: 127.0.0.1, key: guard.key}", "{bind: 127.0.0.1:15100}", "{key: guard.key}",
+                           "{bind: 127.0.0.1:15100, key: guard.key, port: 3}", "3"})
+    EXPECT_SENTENCE(test::thrown_message<InputError>(
+        [&] { (void)parse_robot_config(std::string(kTwin) + "network: " + text + "\n", "twin.yaml"); }));
+}
+
 TEST(RobotConfig, ARobotHasNoOdometryUntilItIsNamed) {
   const RobotConfig robot =
       parse_robot_config("schema: duet.robot/1\nrobot: x\ninterface: eth0\ndomain: 0\nmode_machine: 5\n", "robot.yaml");

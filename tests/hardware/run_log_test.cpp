@@ -385,6 +385,38 @@ TEST(RunLog, RefusedEstimatesAreSaidWithTheirReason) {
   EXPECT_EQ(fault->count, 2);
 }
 
+TEST(RunLog, DatagramsThatWereRefusedAreSaidWithTheirReason) {
+  const test::ScratchFolder folder;
+  {
+    GuardedTwin robot(test::twin_guard(), {});
+    RunLog log(folder / "run.mcap", test::twin_guard());
+    NetworkCounts counts{};
+    for (int tick = 0; tick < 600; ++tick) {
+      ++counts[0];
+      if (tick == 100) counts[static_cast<std::size_t>(SealRefusal::kForged)] = 40;
+      if (tick == 100) counts[static_cast<std::size_t>(SealRefusal::kLate)] = 1;
+      robot.guard.note_network(counts);
+      robot.tick();
+      log.add(robot.guard);
+    }
+  }
+  std::vector<std::string> said;
+  NetworkCounts last{};
+  LogParts parts;
+  parts.event = [&](const LogEvent& event) {
+    if (event.kept_out > 0) said.push_back(event.why + " " + std::to_string(event.kept_out));
+  };
+  parts.health = [&](const HealthMessage& message) { last = message.health.network; };
+  EXPECT_TRUE(read_run_log(folder / "run.mcap", parts));
+  EXPECT_THAT(said, testing::ElementsAre("forged 40", "late 1"));
+  EXPECT_EQ(last[static_cast<std::size_t>(SealRefusal::kForged)], 40);
+  EXPECT_GT(last[0], 580);
+  const RunReport report = report_of_log(folder / "run.mcap");
+  const auto fault = std::ranges::find(report.faults, "from the network, refused: forged", &RunReport::Fault::name);
+  ASSERT_NE(fault, report.faults.end());
+  EXPECT_EQ(fault->count, 40);
+}
+
 // A ring that is full while the writer sleeps: the log says where ticks are missing, and how many.
 TEST(RunLog, TicksThatFoundNoRoomAreSaidInTheLog) {
   const test::ScratchFolder folder;
