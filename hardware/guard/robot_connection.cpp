@@ -98,6 +98,16 @@ const Schema<NetworkPlace>& network_schema() {
   return schema;
 }
 
+const Schema<ChecklistDemand>& checklist_demand_schema() {
+  using D = ChecklistDemand;
+  constexpr double kMostHours = 168.0;  // a week
+  static const Schema<D> schema = {required_key({"form"}, &D::form),
+                                   optional_key({.name = "hours", .range = {0.1, kMostHours}}, &D::hours),
+                                   optional_key({.name = "up_to", .choices = checklist_names()}, &D::up_to),
+                                   optional_key({"required"}, &D::required)};
+  return schema;
+}
+
 void read_network(const std::string& file, const YamlSection& top, RobotConfig& config) {
   read_mapping(file, top.node("network"), "network", network_schema(), config.network);
   try {
@@ -134,7 +144,7 @@ RobotConfig parse_robot_config(const std::string& text, const std::string& file)
   const YamlSection top(
       file, parse_yaml(text, file), "robot",
       {"schema", "robot", "interface", "domain", "mode_machine", "allow_motion", "twin", "person", "limits", "touches",
-       "contact_limits", "executor", "odometry", "arm_action", "lcm", "camera", "network"});
+       "contact_limits", "executor", "odometry", "arm_action", "lcm", "camera", "network", "checklist"});
   top.require_schema(kRobotSchema);
   RobotConfig config;
   config.permission = {.allow_motion = false,
@@ -152,6 +162,8 @@ RobotConfig parse_robot_config(const std::string& text, const std::string& file)
   if (top.has("lcm")) read_mapping(file, top.node("lcm"), "lcm", lcm_schema(), config.lcm);
   if (top.has("camera")) read_camera(file, top.node("camera"), config);
   if (top.has("network")) read_network(file, top, config);
+  if (top.has("checklist"))
+    read_mapping(file, top.node("checklist"), "checklist", checklist_demand_schema(), config.checklist);
   try {
     config.twin ? check_twin_place(config.place()) : check_place(config.place());
   } catch (const std::invalid_argument& error) {

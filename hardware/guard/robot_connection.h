@@ -9,6 +9,7 @@
 #include "duet/hardware/executors/executor.h"
 #include "duet/hardware/guard/person_track.h"
 #include "duet/hardware/guard/robot_guard.h"
+#include "duet/hardware/safety/checklist.h"
 #include "duet/hardware/wire/datagram_socket.h"
 #include "duet/hardware/wire/lcm_message.h"
 #include "duet/hardware/wire/odometry_source.h"
@@ -87,6 +88,7 @@ struct RobotConfig {
   bool has_camera = false;
   NetworkPlace network;  // where planners and estimators of other computers reach the guard
   bool has_network = false;
+  ChecklistDemand checklist;
 
   [[nodiscard]] DdsPlace place() const { return {permission.domain, permission.interface}; }
 };

@@ -29,6 +29,7 @@ struct GuardSetup {
   bool dry_run = true;
   ExecutorKind executor = ExecutorKind::kTwin;      // for the log
   std::string walker = {};                          // the controller in the guard; for the log
+  std::string checklist = {};                       // the form, as JSON; empty: none; for the log
   OdometrySource odometry = OdometrySource::kTwin;  // for the log
   bool has_battery = false;                         // its charge is reported, and an unknown one holds
 };

@@ -284,13 +284,14 @@ void RunLog::write_refusals(const Slot& slot) {
 
 void RunLog::write_setup(std::uint64_t time) {
   const LimiterSetup& limiter = setup_.limiter;
-  write_json(kSetupChannel, time,
-             {{"duet", duet_version()},
-              {"limiter", limiter_setup_json(limiter)},
-              {"odometry", kOdometryNames[static_cast<std::size_t>(setup_.odometry)]},
-              {"executor", executed_channels_json(executed_channels(setup_.executor, *limiter.robot,
-                                                                    limiter.executed.joints, setup_.walker),
-                                                  *limiter.robot)}});
+  nlohmann::json setup = {{"duet", duet_version()},
+                          {"limiter", limiter_setup_json(limiter)},
+                          {"odometry", kOdometryNames[static_cast<std::size_t>(setup_.odometry)]},
+                          {"executor", executed_channels_json(executed_channels(setup_.executor, *limiter.robot,
+                                                                                limiter.executed.joints, setup_.walker),
+                                                              *limiter.robot)}};
+  if (!setup_.checklist.empty()) setup["checklist"] = nlohmann::json::parse(setup_.checklist);
+  write_json(kSetupChannel, time, setup);
 }
 
 // The messages that others plot, for the ticks since the last one.

@@ -87,6 +87,14 @@ class ReportGatherer {
     report_.program = word(json, "duet");
     report_.odometry = word(json, "odometry");
     report_.executor = word(json.value("executor", nlohmann::json()), "executor");
+    const nlohmann::json form = json.value("checklist", nlohmann::json());
+    report_.checked_by = word(form, "who");
+    report_.checked_when = word(form, "when");
+    report_.checks.clear();
+    if (form.is_object() && form.contains("items") && form["items"].is_array())
+      for (const nlohmann::json& item : form["items"])
+        report_.checks.push_back({word(item, "name"), word(item, "value"),
+                                  item.is_object() && item.contains("done") && item["done"] == true});
     report_.joints.clear();
     for (const RobotJoint& joint : setup.robot->joints) report_.joints.push_back({joint.name, 0.0, 0.0, 0.0, {}});
   }

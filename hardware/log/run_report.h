@@ -38,14 +38,21 @@ struct RunReport {
     ClampCounts changed{};            // ticks while it ran
   };
 
+  struct Check {
+    std::string name, value;
+    bool done = false;
+  };
+
   std::string program, executor, odometry;  // as the log's setup names them
-  bool whole = false;                       // the log has its end
-  bool has_health = false;                  // older logs do not: ages, charge and faults are not known then
-  double seconds = 0.0, ran = 0.0;          // of the log; of it in the state `run`
-  long ticks = 0, dropped = 0;              // in the log; that it had no room for
-  long states = 0, missed = 0;              // of the robot; by its own count, between two that were read
-  long commands = 0, plans = 0;             // frames that were sent; commands of a planner that came while it ran
-  double commanded = 0.0;                   // for which frames were sent [s]
+  std::string checked_by, checked_when;     // of the checklist; "" where the log has none
+  std::vector<Check> checks;
+  bool whole = false;               // the log has its end
+  bool has_health = false;          // older logs do not: ages, charge and faults are not known then
+  double seconds = 0.0, ran = 0.0;  // of the log; of it in the state `run`
+  long ticks = 0, dropped = 0;      // in the log; that it had no room for
+  long states = 0, missed = 0;      // of the robot; by its own count, between two that were read
+  long commands = 0, plans = 0;     // frames that were sent; commands of a planner that came while it ran
+  double commanded = 0.0;           // for which frames were sent [s]
   std::vector<Span> spans;
   std::vector<Fault> faults;
   ClampCounts changed{};  // while it ran: how often for each reason

@@ -248,6 +248,7 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   setup.walker = arguments.walker;
   const std::string refusal = walker_refusal(config.executor, arguments.walker, is_told_velocities(arguments.walker));
   if (!refusal.empty()) throw InputError("not armed: " + refusal);
+  setup.checklist = checked_form(session, arguments.config, config);
   const std::unique_ptr<Walker> walker = walker_for(arguments, setup);
   RunLog log(arguments.log, setup, status_sender(arguments.socket));
   ArmingFacts facts = facts_for(config, setup, arguments, log);
@@ -408,6 +409,7 @@ void add_hardware(CLI::App& app, Session& session) {
   }
   add_play_partner(*hardware, session);
   add_network(*hardware, session);
+  add_checklist(*hardware, session);
   add_see(*hardware, session);
   add_calibrate(*hardware, session);
   add_holds(*hardware, session);

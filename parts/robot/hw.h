@@ -6,6 +6,7 @@
 #include <string>
 
 #include "duet/app/command.h"
+#include "duet/hardware/guard/robot_connection.h"
 #include "duet/hardware/guard/robot_guard.h"
 #include "duet/hardware/log/run_log.h"
 
@@ -46,6 +47,12 @@ RunLog::Watch status_sender(const std::string& socket);
 
 // `duet hw key` and `duet hw link`: a guard on another computer.
 void add_network(CLI::App& hardware, Session& session);
+
+// `duet hw checklist`: a form to fill in, and whether it does.
+void add_checklist(CLI::App& hardware, Session& session);
+// The form of a configuration, as JSON for its log; "" where it names none. Throws InputError where it is required and
+// does not do; otherwise it is noted.
+std::string checked_form(Session& session, const std::string& config_path, const RobotConfig& config);
 
 // `duet hw see`: recorded estimates of a person into guard and policy.
 void add_see(CLI::App& hardware, Session& session);

@@ -56,6 +56,7 @@ class LogAnalysis {
   }
   Analysis make() {
     add_notes();
+    add_checks();
     add_states();
     add_faults();
     add_changes();
@@ -103,6 +104,18 @@ class LogAnalysis {
   void end_table() {
     TitledTable& titled = analysis_.tables.back();
     if (titled.table.rows.empty()) titled.notes.emplace_back(nothing_);
+  }
+
+  void add_checks() {
+    if (report_.checks.empty()) return;
+    TextTable& table = add_table("Checklist", {"Item", "Done", "Value"}, 3);
+    for (const RunReport::Check& check : report_.checks) {
+      table.rows.push_back({check.name, check.done ? "yes" : "no", check.value.empty() ? "-" : check.value});
+      of(check.name).word("checked", check.done ? "yes" : "no");
+      if (!check.value.empty()) of(check.name).word("check_value", check.value);
+    }
+    analysis_.tables.back().notes.push_back(
+        fmt::format("Filled in by {} at {}.", report_.checked_by, report_.checked_when));
   }
 
   void add_states() {
