@@ -47,6 +47,9 @@ class DstarPolicy final : public Policy {
       require_known_task(name_, kPaperTasks, context.task);
     if (network_->config.language_on) embedding_ = language_->embed(prompt);
     random_ = Random(context.seed, stream_key({"policy", "noise"}));
+    const bool leads = is_leading(context.prompt);
+    draws_each_ = sampling_.noise == NoiseMode::kCall || (sampling_.noise == NoiseMode::kLead && leads);
+    deviation_ = sampling_.noise == NoiseMode::kLead && !leads ? 0.0 : sampling_.temperature;
     draw();
     drawn_ = true;
     past_.reset();
@@ -55,7 +58,7 @@ class DstarPolicy final : public Policy {
 
   Anchors act(const Observation& observation) override {
     require(drawn_, "policy '{}': reset comes first", name_);
-    if (sampling_.noise == NoiseMode::kCall) draw();
+    if (draws_each_) draw();
     past_.add(observation);
     maker_.make(observation, past_.frames(), features_);
     const std::span<const float> plan = runner_.run({.features = &features_, .language = embedding_, .noise = noise_});
@@ -81,7 +84,7 @@ class DstarPolicy final : public Policy {
     return context.prompt == leading_prompt(prompt) && !network_->notes.contains(kBegins) ? prompt : context.prompt;
   }
   void draw() {
-    for (float& value : noise_) value = static_cast<float>(sampling_.temperature * random_.normal());
+    for (float& value : noise_) value = static_cast<float>(deviation_ * random_.normal());
   }
 
   std::string name_;
@@ -96,7 +99,8 @@ class DstarPolicy final : public Policy {
   std::vector<float> embedding_, noise_ = std::vector<float>(kPlanSize);
   Random random_{0, 0};
   PolicyFaults faults_;
-  bool drawn_ = false;
+  double deviation_ = 0.0;  // of x_T in this episode
+  bool drawn_ = false, draws_each_ = false;
 };
 
 // A network that ships, and what its file's name has behind the policy's.
@@ -125,8 +129,10 @@ const FieldTable<DstarOptions>& dstar_options() {
                      &O::language),
       duet::field<O>(
           {.name = "noise",
-           .meaning = "where temperature is not 0, x_T is drawn once an episode; call: anew for each plan",
-           .choices = {"episode", "call"}},
+           .meaning =
+               "where temperature is not 0, x_T is drawn once an episode; call: anew for each plan; lead: anew for "
+               "each plan where the command says that the robot begins, none elsewhere",
+           .choices = {"episode", "call", "lead"}},
           [](auto& o) -> auto& { return o.sampling.noise; }),
       duet::field<O>(
           {.name = "temperature",

@@ -17,6 +17,7 @@ namespace duet {
 enum class NoiseMode {
   kEpisode,  // x_T drawn once per episode: successive plans are of one mode
   kCall,     // drawn anew at each call
+  kLead,     // as kCall where the command says that the robot begins, none where it answers
 };
 
 struct DstarSampling {
@@ -31,8 +32,8 @@ std::unique_ptr<Policy> make_dstar_policy(const std::string& name, std::shared_p
                                           const DstarSampling& sampling = {});
 
 // The entry of "dstar" or "dp": options `network` (braced: the default, student, or a file), `language` (NPZ table;
-// default: built in), `noise` (episode | call), `temperature`. Throws what load_dstar_network and load_language_table
-// throw; MissingError where the file is not there.
+// default: built in), `noise` (episode | call | lead), `temperature`. Throws what load_dstar_network and
+// load_language_table throw; MissingError where the file is not there.
 PolicyInfo dstar_info(const std::string& name);
 PolicyMaker dstar_maker(const std::string& name, std::shared_ptr<const RobotModel> robot, const PolicyOptions& options);
 LoadedFiles dstar_files(const std::string& name, const PolicyOptions& options);

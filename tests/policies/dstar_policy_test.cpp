@@ -97,6 +97,15 @@ TEST(DstarPolicy, KeepsItsNoiseForTheEpisodeOrDrawsItByCall) {
   }
 }
 
+TEST(DstarPolicy, DrawsByCallOnlyWhereItIsToldToBeginIfAskedTo) {
+  const std::string first = leading_prompt(task_prompt(Task::kHug));
+  const auto lead = make({.noise = NoiseMode::kLead, .temperature = 0.5}), still = make({.temperature = 0.0}),
+             by_call = make({.noise = NoiseMode::kCall, .temperature = 0.5});
+  EXPECT_EQ(episode(*lead, context_of(1)), episode(*still, context_of(1)));
+  EXPECT_EQ(episode(*lead, context_of(1, first)), episode(*by_call, context_of(1, first)));
+  EXPECT_NE(episode(*lead, context_of(1, first)), episode(*still, context_of(1, first)));
+}
+
 TEST(DstarPolicy, WithoutTemperatureItsSeedDoesNotMatter) {
   const auto still = make({.temperature = 0.0}), half = make({.temperature = 0.5});
   const std::vector<double> first = episode(*still, context_of(1));
