@@ -218,6 +218,9 @@ Blame blame_episode(const Experiment& experiment, const EpisodeSpec& spec, const
                     Progress& progress) {
   require(spec.engine != kPlaybackEngine, "blame: expected an episode in an engine, found one of playback");
   require(spec.reference == nullptr, "blame: expected an episode of a clip, found one of a walking command");
+  require(experiment.suite().partner != SuitePartner::kYielding,
+          "blame: expected a partner who is a ghost or solid, found one who yields: a restart does not say how they "
+          "moved");
   const EpisodeRuns runs(experiment, spec, options);
   const EpisodeRuns::Run run = runs.run(spec.engine, nullptr);
   Blame blame;

@@ -127,7 +127,7 @@ Scene Experiment::scene(const EpisodeSpec& spec) const {
   Scene scene;
   scene.robot = with_armature(perturbed_robot(*spec.perturbation, spec.body->robot), settings.armature);
   scene.friction.robot_ground = spec.perturbation->friction.value_or(scene.friction.robot_ground);
-  scene.partner = suite_.partner;
+  scene.partner = scene_mode(suite_.partner);
   if (spec.reference == nullptr) {
     std::array<double, kSmplJoints> bones = bone_lengths(spec.clip->partner);
     if (spec.perturbation->partner)
@@ -148,6 +148,7 @@ EpisodeConditions Experiment::conditions(const EpisodeSpec& spec, const Pose& st
   conditions.fall = spec.body->robot->fall;
   conditions.wall_limit = suite_.wall_limit;
   conditions.stop_asked = signalled;
+  conditions.partner_yields = suite_.partner == SuitePartner::kYielding;
   return conditions;
 }
 

@@ -88,8 +88,12 @@ std::vector<std::string> notes_of(const Suite& suite) {
       kNullAndLift,
       "Episodes that fell, diverged, timed out or failed with an error count as failures.",
   };
-  if (suite.partner == PartnerMode::kGhost)
+  if (suite.partner == SuitePartner::kGhost)
     notes.emplace_back("A ghost partner touches nothing: the robot passes through it.");
+  if (suite.partner == SuitePartner::kYielding)
+    notes.emplace_back(
+        "A yielding partner gives way where the robot touches them, as a passive body does: they do not step, and they "
+        "intend nothing but the clip.");
   if (std::ranges::find(suite.engines, kPlaybackEngine) != suite.engines.end())
     notes.emplace_back(
         "Playback moves the robot along its reference without physics. It is no upper bound for policies that look at "

@@ -47,7 +47,7 @@ std::map<std::string, std::string> absent_engines(const Suite& suite, const RunO
   int present = plays_back(named, options) ? 1 : 0;
   for (const EngineInfo& engine : engines()) {
     if (std::ranges::find(named, engine.name) == named.end() || !chosen(options.engines, engine.name)) continue;
-    const std::string refusal = refusal_of(engine.name, suite.partner);
+    const std::string refusal = refusal_of(engine.name, scene_mode(suite.partner));
     if (!engine.available)
       absent[engine.name] = fmt::format("engine '{}' is absent: {}", engine.name, engine.reason);
     else if (!refusal.empty())

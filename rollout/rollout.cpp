@@ -11,6 +11,7 @@
 #include "duet/core/robot_state.h"
 #include "duet/rollout/perturbations/perturbation.h"
 #include "duet/rollout/world.h"
+#include "duet/rollout/yielding_partner.h"
 
 namespace duet {
 namespace {
@@ -89,12 +90,19 @@ class PhysicsWorld final : public World {
         command_(backend.scene().robot->default_command(episode.start.q)),
         disturbance_(episode.perturbation, *backend.scene().robot, episode.start, steps_per_act_,
                      steps_ / steps_per_act_, backend.scene().dt, episode.perturbation_seed),
-        meter_(backend, episode.limits) {}
+        meter_(backend, episode.limits) {
+    if (!episode.partner_yields || backend.scene().partner != PartnerMode::kSolid) return;
+    require(episode.restart == nullptr,
+            "a partner who yields: expected an episode from its start, found one that is taken up again, which does "
+            "not say how they moved");
+    yielding_.emplace(backend.scene().human, backend.scene().dt);
+  }
 
   void begin(const RobotState& start) override {
     tick_ = 0;
     controller_.reset(start);
     backend_.reset(episode_.restart == nullptr ? start : episode_.restart->start);
+    if (yielding_) yielding_->reset();
   }
   [[nodiscard]] const RobotState& state() const override {
     return is_recorded() ? episode_.restart->recorded[static_cast<std::size_t>(tick_)] : backend_.state();
@@ -111,24 +119,32 @@ class PhysicsWorld final : public World {
     const bool was_recorded = is_recorded();
     tick_ = tick + 1;
     if (was_recorded) return Outcome::kOk;
-    if (!partner.empty())
-      backend_.set_partner(partner_joints(partner, tick), partner_velocities(partner, tick, kTickRate));
+    if (!partner.empty()) lead_partner(partner, tick);
     disturbance_.act(tick, backend_);
     const Outcome outcome = step_control_period(
         backend_, steps_,
         [this](int i) -> const JointCommand& {
           if (i > 0 && i % steps_per_act_ == 0) act();
+          give_way();
           return disturbance_.in_effect(i % steps_per_act_);
         },
         [&](int i) {
           meter_.add();
+          if (yielding_) yielding_->step(backend_.contacts());
           const bool look = (i + 1) % kStepsPerLook == kStepsPerLook - 1 && i + 1 < steps_;
           return !look || (!deadline.passed() && !deadline.stop_asked());
         });
     if (outcome != Outcome::kOk) return outcome;
     meter_.end_tick();
+    if (yielding_ && yielding_->touched()) seen_ = partner_joints(partner, tick + 1) + yielding_->displacement();
     return has_fallen(backend_.state(), episode_.fall) ? Outcome::kFell : Outcome::kOk;
   }
+
+  // Where a person is who gave way; before, and for everybody else, the episode says it.
+  [[nodiscard]] const HumanJoints* seen_partner() const override {
+    return yielding_ && yielding_->touched() ? &seen_ : nullptr;
+  }
+  [[nodiscard]] bool records_what_it_sees() const override { return true; }
 
   void finish(Rollout& rollout) const override {
     meter_.finish(rollout);
@@ -153,6 +169,16 @@ class PhysicsWorld final : public World {
     disturbance_.send(command_);
   }
 
+  void lead_partner(const PointTracks& partner, int tick) {
+    const HumanJoints joints = partner_joints(partner, tick), velocities = partner_velocities(partner, tick, kTickRate);
+    if (yielding_) yielding_->lead(joints, velocities);
+    if (!yielding_ || !yielding_->touched()) backend_.set_partner(joints, velocities);
+  }
+  // An untouched person goes on as a solid one, to the bit.
+  void give_way() {
+    if (yielding_ && yielding_->plan()) backend_.set_partner(yielding_->joints(), yielding_->velocities());
+  }
+
   [[nodiscard]] bool is_recorded() const { return episode_.restart != nullptr && tick_ < episode_.restart->tick; }
 
   const Episode& episode_;
@@ -164,6 +190,8 @@ class PhysicsWorld final : public World {
   JointCommand command_;
   Disturbance disturbance_;
   StepMeter meter_;
+  std::optional<YieldingPartner> yielding_;
+  HumanJoints seen_ = HumanJoints::Zero();
 };
 
 // A world without physics: the robot is where its reference was a tick ago.

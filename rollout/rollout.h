@@ -49,6 +49,7 @@ struct EpisodeConditions {
   EpisodeClock clock = {};
   std::optional<ContactLimits> limits;      // that contacts with a solid partner are held against
   std::function<bool()> stop_asked;         // polled once a tick; the episode then ends as kTimedOut with `interrupted`
+  bool partner_yields = false;              // a solid partner gives way (rollout/yielding_partner.h)
   const EpisodeRestart* restart = nullptr;  // outlives the episode; null: physics from the start
 };
 

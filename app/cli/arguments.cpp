@@ -90,7 +90,7 @@ void add_suite_options(CLI::App& command, SuiteArguments& arguments) {
   command.add_option("--network", arguments.networks,
                      "NAME=PATH: the network of one of the suite's controllers or policies (repeatable)");
   command.add_option("--start", arguments.start, "auto, clip, approach, act or sim_to_real: where episodes begin");
-  command.add_option("--partner", arguments.partner, "none, ghost or solid");
+  command.add_option("--partner", arguments.partner, "none, ghost, solid or yielding");
   command.add_option("--profile", arguments.profile, "engine profile: parity, fast, accurate or a file");
   add_allow_programs(command, arguments.allow_programs);
 }

@@ -91,7 +91,7 @@ Embodiments::Embodiments(const Suite& suite, const std::vector<std::string>& ski
                          const std::map<std::string, PolicyLoader>& called) {
   require_allowed(programs_of(suite, skipped_policies), suite.allow_programs);
   const DigestReads reads(read_);
-  if (suite.partner == PartnerMode::kSolid) limits_ = load_contact_limits(suite.contact_limits_file());
+  if (scene_mode(suite.partner) == PartnerMode::kSolid) limits_ = load_contact_limits(suite.contact_limits_file());
   add(suite.card());
   for (const SuiteController& controller : suite.controllers) {
     ControllerOnBody& entry = controllers_[controller.name];

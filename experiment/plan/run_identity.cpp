@@ -56,7 +56,7 @@ std::string robots_text(const Suite& suite, const RobotModel& nominal) {
 }
 
 std::string limits_digest(const Suite& suite, FileDigests& files) {
-  return suite.partner == PartnerMode::kSolid ? files.of(suite.contact_limits_file()) : "";
+  return scene_mode(suite.partner) == PartnerMode::kSolid ? files.of(suite.contact_limits_file()) : "";
 }
 
 SuiteController without_places(SuiteController controller, FileDigests& files) {

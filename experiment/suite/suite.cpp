@@ -161,9 +161,11 @@ const NameTable<Likeness>& likeness_names() {
   return names;
 }
 
-const NameTable<PartnerMode>& partner_names() {
-  static const NameTable<PartnerMode> names = {
-      {"none", PartnerMode::kNone}, {"ghost", PartnerMode::kGhost}, {"solid", PartnerMode::kSolid}};
+const NameTable<SuitePartner>& partner_names() {
+  static const NameTable<SuitePartner> names = {{"none", SuitePartner::kNone},
+                                                {"ghost", SuitePartner::kGhost},
+                                                {"solid", SuitePartner::kSolid},
+                                                {"yielding", SuitePartner::kYielding}};
   return names;
 }
 
@@ -188,7 +190,18 @@ const NameTable<ThresholdSet>& threshold_names() {
 }
 
 std::string_view to_string(SuiteStart start) { return name_of(start_names(), start); }
-std::string_view to_string(PartnerMode partner) { return name_of(partner_names(), partner); }
+std::string_view to_string(SuitePartner partner) { return name_of(partner_names(), partner); }
+
+PartnerMode scene_mode(SuitePartner partner) {
+  switch (partner) {
+    case SuitePartner::kNone:
+      return PartnerMode::kNone;
+    case SuitePartner::kGhost:
+      return PartnerMode::kGhost;
+    default:
+      return PartnerMode::kSolid;
+  }
+}
 
 namespace {
 

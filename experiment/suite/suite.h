@@ -32,6 +32,8 @@ namespace duet {
 
 // auto: act where the controller cannot walk, else approach
 enum class SuiteStart { kAuto, kClip, kApproach, kAct, kSimToReal };
+// As PartnerMode; yielding: solid, and gives way where they are touched (rollout/yielding_partner.h).
+enum class SuitePartner { kNone, kGhost, kSolid, kYielding };
 enum class RecordTrajectories { kNone, kFailures, kAll };
 enum class ClipRoles { kOwn, kBoth };  // whom the robot replaces: whom the clip says, or each person in turn
 
@@ -47,13 +49,16 @@ const NameTable<Side>& side_names();
 const NameTable<ActOutcome>& act_outcome_names();
 const NameTable<ClipRoles>& role_names();
 const NameTable<Likeness>& likeness_names();  // "rehearsed", "people", "varied"
-const NameTable<PartnerMode>& partner_names();
+const NameTable<SuitePartner>& partner_names();
 const NameTable<RecordTrajectories>& record_names();
 const NameTable<DetectorVersion>& version_names();
 const NameTable<ThresholdSet>& threshold_names();
 
 std::string_view to_string(SuiteStart start);
-std::string_view to_string(PartnerMode partner);
+std::string_view to_string(SuitePartner partner);
+
+// How engines have them: a yielding one as a solid one.
+PartnerMode scene_mode(SuitePartner partner);
 
 // Its names in the order of the enumerators, which count from 0: the choices of a field (core/field.h).
 template <typename E>
@@ -177,7 +182,7 @@ struct Suite {
   int episodes_per_clip = 1;
   SuiteStart start = SuiteStart::kAuto;
   double start_radius = 1.0;  // of `approach` [m]
-  PartnerMode partner = PartnerMode::kGhost;
+  SuitePartner partner = SuitePartner::kGhost;
   int fuse_ticks = kTicksPerPlan;                             // SchedulerOptions
   double max_root_speed = SchedulerOptions{}.max_root_speed;  // [m/s]
   Profile profile;                                            // step and solver settings of the suite's engines

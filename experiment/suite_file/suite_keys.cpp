@@ -40,7 +40,7 @@ SuiteKey schema_key() {
 void lead_by_velocity(Suite& suite) {
   suite.policies = {SuitePolicy{.name = kVelocityPolicy, .use = "replay"}};
   suite.null_arm = false;
-  suite.partner = PartnerMode::kNone;
+  suite.partner = SuitePartner::kNone;
   suite.start = SuiteStart::kClip;
 }
 
@@ -187,7 +187,8 @@ void add_start_and_partner(Keys& keys) {
                              &Suite::start_radius),
                 With::kClips));
   keys.push_back(plain_key(field<Suite>({.name = "partner",
-                                         .meaning = "`ghost` touches nothing (as in the supplement), `solid` pushes",
+                                         .meaning = "`ghost` touches nothing (as in the supplement), `solid` pushes, "
+                                                    "`yielding` pushes and gives way (deviations.md, E7)",
                                          .choices = choices_of(partner_names())},
                                         &Suite::partner),
                            With::kClips));

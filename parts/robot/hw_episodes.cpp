@@ -61,6 +61,11 @@ class TwinEpisodes {
       throw InputError(fmt::format("{}: expected a twin's configuration (twin: true)", arguments.config));
     if (!config_.permission.allow_motion)
       throw InputError(fmt::format("{}: it does not allow motion: 'allow_motion' is not true", arguments.config));
+    if (experiment_.suite().partner == SuitePartner::kYielding)
+      throw InputError(
+          fmt::format("{}: expected a partner who is none, ghost or solid, found yielding: the twin has "
+                      "no person who gives way",
+                      arguments.suite));
     if (is_solid() && clock_ != TwinClock::kInProcess)
       throw InputError(
           fmt::format("a person who can be touched (partner: solid in '{}') needs --clock in-process, found "
@@ -101,7 +106,7 @@ class TwinEpisodes {
     return load_suite(suite_file(arguments.suite), overrides);
   }
 
-  [[nodiscard]] bool is_solid() const { return experiment_.suite().partner == PartnerMode::kSolid; }
+  [[nodiscard]] bool is_solid() const { return experiment_.suite().partner == SuitePartner::kSolid; }
 
   void say_first() const {
     note(session_,

@@ -32,7 +32,7 @@ std::string refusal(const std::string& extra, const std::string& base = kMinimal
 TEST(Suite, DefaultsAreTheDocumentedOnes) {
   const Suite suite = parse_suite(kMinimal, "s.yaml");
   EXPECT_EQ(suite.tasks, std::vector<Task>(kPaperTasks.begin(), kPaperTasks.end()));  // whatever tasks are added
-  EXPECT_EQ(suite.partner, PartnerMode::kGhost);
+  EXPECT_EQ(suite.partner, SuitePartner::kGhost);
   EXPECT_EQ(suite.detector, DetectorVersion::kRobot);
   EXPECT_EQ(suite.start, SuiteStart::kAuto);
   EXPECT_TRUE(suite.null_arm);
