@@ -12,6 +12,7 @@
 #include "duet/experiment/suite_file/suite_actors.h"
 #include "duet/experiment/suite_file/suite_key.h"
 #include "duet/robots/yaml_section.h"
+#include "duet/rollout/yielding_partner.h"
 
 namespace duet {
 namespace {
@@ -51,11 +52,20 @@ void check_references(const YamlSection& top, const Suite& suite) {
     });
 }
 
+void check_partner(const YamlSection& top, const Suite& suite) {
+  if (suite.partner != SuitePartner::kYielding) return;
+  for (const std::string& engine : suite.engines)
+    if (const double dt = suite.profile.settings(engine).dt; dt > kYieldingLongestStep)
+      top.fail_key("partner", fmt::format("a yielding partner needs a physics step of at most {} s, found {} s of '{}'",
+                                          kYieldingLongestStep, dt, engine));
+}
+
 // Checks the keys against each other.
 void check_whole(const YamlSection& top, const Suite& suite) {
   if (!suite.references.empty()) check_commands(top, suite);
   check_references(top, suite);
   check_variants(top, suite);
+  check_partner(top, suite);
   const SuiteClips& clips = suite.clips;
   const std::size_t made = clips.synth_per_task * suite.tasks.size() + clips.files.size() * (1 + clips.synth_per_file);
   require_sane_size(suite, static_cast<std::int64_t>(made * clips.copies() + suite.references.size()));

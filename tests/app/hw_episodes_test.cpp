@@ -63,6 +63,18 @@ TEST(HwEpisodes, ASolidPersonNeedsTheTwinInThisProcess) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
+TEST(HwEpisodes, ATwinHasNoPersonWhoGivesWay) {
+  const test::ScratchFolder folder;
+  const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/";
+  const test::Answer answer = test::duet_program(
+      "hw episodes " + examples + "twin.yaml " + examples +
+      "episodes.yaml -s 'controllers=[wbc_sim]' -s partner=yielding --clock in-process -o " + (folder / "out"));
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_NE(answer.err.find("expected a partner who is none, ghost or solid, found yielding"), std::string::npos)
+      << answer.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
 TEST(HwEpisodes, AClockThatIsNoneIsRefused) {
   const test::ScratchFolder folder;
   const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/";

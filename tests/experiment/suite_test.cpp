@@ -40,6 +40,20 @@ TEST(Suite, DefaultsAreTheDocumentedOnes) {
   EXPECT_EQ(suite.profile.settings("mujoco").dt, 0.002);
 }
 
+TEST(Suite, AYieldingPartnerIsSolidForEnginesAndNeedsAShortStep) {
+  const std::string yielding = "partner: yielding\n";
+  const Suite suite = parse_suite(kMinimal + yielding, "s.yaml");
+  EXPECT_EQ(suite.partner, SuitePartner::kYielding);
+  EXPECT_EQ(scene_mode(suite.partner), PartnerMode::kSolid);
+  EXPECT_EQ(parse_suite(resolved_yaml(suite), "again.yaml").partner, suite.partner);
+  if (!is_available("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  std::string in_engine = kMinimal;
+  in_engine.replace(in_engine.find("playback"), std::string("playback").size(), "mujoco");
+  EXPECT_NE(
+      refusal(yielding + "dt: 0.004\n", in_engine).find("a yielding partner needs a physics step of at most 0.002 s"),
+      std::string::npos);
+}
+
 TEST(Suite, ResolvedTextReadsBackToTheSameHash) {
   const Suite suite =
       parse_suite(std::string(kMinimal) +
