@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/run_identity.h"
