@@ -1,6 +1,6 @@
 // A person who gives way: what the clip does is what they want, and a passive body lies between it and the skin that
 // the robot touches. Trunk and legs shift together over the floor; head, upper arms and forearms with hands hang on
-// them by springs and dampers and keep their bones' lengths. Whoever is touched by nobody is where the clip has them.
+// them by springs and dampers and keep their bones' lengths. Untouched, they are where the clip has them.
 // Not modelled: reflexes, a step back, a trunk that bends, wrists, any intention. Feet slide with the trunk.
 #pragma once
 
@@ -20,14 +20,15 @@ namespace duet {
 // beyond the joint.
 inline constexpr double kYieldingTrunkMass = 40.0, kYieldingHeadMass = 7.4, kYieldingForearmMass = 2.0,
                         kYieldingHandMass = 0.6;
-// Of hand and elbow against the trunk [N/m]: measured endpoint stiffness of relaxed arms is 100 to 400 N/m
+// Stiffness of hand and elbow against the trunk [N/m]: measured endpoint stiffness of relaxed arms is 100 to 400 N/m
 // (Mussa-Ivaldi, Hogan and Bizzi 1985; Dolan, Friedman and Nagurka 1993). Share of critical damping: about a quarter
 // (Perreault, Kirsch and Crago 2004).
 inline constexpr double kYieldingArmStiffness = 300.0, kYieldingArmDamping = 0.25;
-// Of the head against the trunk: about 15 N m/rad of the neck over 0.15 m, an estimate [N/m]; damping as the arms'.
+// Stiffness of the head against the trunk: about 15 N m/rad of the neck over 0.15 m, an estimate [N/m]; damping as the
+// arms'.
 inline constexpr double kYieldingHeadStiffness = 600.0;
-// Of the trunk, pushed 1.2 m above the floor: what a standing person's ankles give beyond gravity, about a third of
-// m g h = 700 N m/rad, and 350 N m s/rad (Peterka 2002) [N/m], [N s/m].
+// Spring and damper of the trunk, pushed 1.2 m above the floor: what a standing person's ankles give beyond gravity,
+// about a third of m g h = 700 N m/rad, and 350 N m s/rad (Peterka 2002) [N/m], [N s/m].
 inline constexpr double kYieldingTrunkStiffness = 160.0, kYieldingTrunkDamping = 240.0;
 // How far the trunk gives way at most: young adults withstood 16.2 cm (SD 2.6) of the floor's displacement without a
 // step (PMC6338353). There they stand as a solid person does [m].
