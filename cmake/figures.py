@@ -17,6 +17,7 @@ import json
 import pathlib
 import re
 import shlex
+import statistics
 import subprocess
 import sys
 
@@ -189,6 +190,25 @@ def conditions(folder):
         parts = [verdict["parts"] for row, verdict in rows if row["policy"] == policy]
         table.append([name, str(len(parts)), *[str(sum(not part[one] for part in parts)) for one in CONDITIONS]])
     return markdown(["Policy", "n", *CONDITIONS], [False] + [True] * 7, table)
+
+
+def partners(solid, yielding):
+    """Hugs, handshakes and high-fives that were won beside a partner whom nothing moves and beside one who gives way, touches over a limit, and hugs' peaks."""
+    runs, table = [judged(solid), judged(yielding)], []
+    touching = ("hug", "handshake", "high_five")
+
+    def both(some):
+        return " → ".join(some)
+
+    for policy, name in policies_and_controls({row["policy"] for row, _ in runs[1]}).items():
+        ours = [[(row, verdict) for row, verdict in rows if row["policy"] == policy] for rows in runs]
+        won = [both(str(sum(v["success"] for r, v in rows if r["task"] == task)) for rows in ours) for task in touching]
+        touched = [[r for r, _ in rows if r["contact_peak_n"] > 0] for rows in ours]
+        over = both(f"{sum(r['forces']['human.worst_ratio'] > 1 for r in rows)} of {len(rows)}" for rows in touched)
+        peaks = [sorted(r["contact_peak_n"] for r in rows if r["task"] == "hug") for rows in touched]
+        median = both(f"{statistics.median(some):.0f}" if some else "-" for some in peaks)
+        table.append([name, *won, over, median])
+    return markdown(["Policy", *[TASKS[task] for task in touching], "over a limit", "hugs' median peak [N]"], [False] + [True] * 5, table)
 
 
 def pictured(file):
@@ -448,13 +468,13 @@ def contents(source, program):
         return arena_engines(*words[1:])
     if words[:1] == ["arena_order"] and len(words) > 1:
         return arena_order(*words[1:])
-    if words[:1] == ["people"] and len(words) == 3:
-        return people(*words[1:])
+    if words[:1] in (["people"], ["partners"]) and len(words) == 3:
+        return (people if words[0] == "people" else partners)(*words[1:])
     tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
               "actuation": actuation, "jitter": jitter, "perception": perception}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, partners RUN RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):

@@ -78,6 +78,17 @@ class Figures(unittest.TestCase):
         rows = (ROOT / "results/published/interaction/episodes.jsonl").read_text().splitlines()
         self.assertEqual(len(lines[4:-2]), len({json.loads(row)["policy"] for row in rows}))
 
+    def test_a_partner_beside_themselves_makes_no_difference(self):
+        self.run_on(f"<!-- figures: partners results/published/interaction results/published/interaction -->\n{END}\n")
+        lines = self.page.read_text().splitlines()
+        self.assertIn("| Hug | Handshake |", lines[2])
+        for line in lines[4:-2]:
+            for cell in line.split(" | ")[1:]:
+                before, after = cell.rstrip(" |").split(" → ")
+                self.assertEqual(before, after)
+        replay = next(line for line in lines if line.startswith("| replay (knows the motion) |"))
+        self.assertIn("| 4 → 4 | 0 → 0 | 4 → 4 | 24 of 33 → 24 of 33 |", replay)
+
     def test_a_command_that_fails_is_refused_with_what_it_said(self):
         self.assertIn("ended with 1", self.refused(f"<!-- figures: duet list -->\n{END}\n", "--program", "/bin/false"))
 
