@@ -2,6 +2,7 @@
 # package.sh BUILD OUT: Debian packages of what BUILD has built: duet (the program, its engines and shipped files) and
 # libduet-dev (headers, static libraries, packages for CMake and pkg-config). Libraries that the program needs are
 # Depends, those that only an engine needs Recommends: without them that engine is absent, and `duet doctor` says why.
+# Where DUET_SYSROOT names libraries of 64-bit ARM (cmake/arm_sysroot.sh), BUILD was made by cmake/aarch64.cmake: duet alone.
 # package.sh --source OUT: a tarball of the commit with all that a build needs beside Debian's packages.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -16,7 +17,7 @@ source_tarball() {
 # What the program and its engines link with: the lines Depends and Recommends, the latter without what is in the former.
 needs() {
   local bin=(usr/bin/*) engines=(usr/lib/duet/engines/*.so)
-  dpkg-shlibdeps --ignore-missing-info -O -dDepends "${bin[@]/#/-e}" -dRecommends "${engines[@]/#/-e}" 2>/dev/null | sed -nE 's/^shlibs:(Depends|Recommends)=/\1: /p'
+  dpkg-shlibdeps "${libraries[@]}" --ignore-missing-info -O -dDepends "${bin[@]/#/-e}" -dRecommends "${engines[@]/#/-e}" 2>/dev/null | sed -nE 's/^shlibs:(Depends|Recommends)=/\1: /p'
 }
 
 licences() {
@@ -36,7 +37,7 @@ TEXT
 control() {  # control PACKAGE FOLDER DESCRIPTION LONG FIELDS
   local size
   size=$(du -sk "$2" | cut -f 1)
-  printf '%s\n' "Package: $1" "Version: $version" "Architecture: $(dpkg --print-architecture)" "Section: science" "Priority: optional" \
+  printf '%s\n' "Package: $1" "Version: $version" "Architecture: $architecture" "Section: science" "Priority: optional" \
     "Maintainer: ${DUET_MAINTAINER:-The authors of duet <duet@localhost>}" "Installed-Size: $size" "$5" "Description: $3" " $4"
 }
 
@@ -45,7 +46,7 @@ pack() {  # pack PACKAGE: $out/PACKAGE with its DEBIAN/control, to a file
   install -Dm 644 <(licences) "$folder/usr/share/doc/$1/copyright"
   gzip -9nc CHANGELOG.md >"$folder/usr/share/doc/$1/changelog.gz"
   chmod -R u+w,go-w "$folder"
-  file=$out/${1}_${version}_$(dpkg --print-architecture).deb
+  file=$out/${1}_${version}_$architecture.deb
   dpkg-deb --root-owner-group -Zxz -z3 --build "$folder" "$file" >/dev/null
   echo "$file"
 }
@@ -54,7 +55,7 @@ program_package() {
   local root=$out/duet usr=$out/duet/usr
   cmake --install "$build" --prefix "$usr" --component share >/dev/null
   cmake --install "$build" --prefix "$usr" --component program --strip >/dev/null
-  [ -f "$usr/share/man/man1/duet.1" ] || install -Dm 644 <("$build/duet" man) "$usr/share/man/man1/duet.1"
+  [ -f "$usr/share/man/man1/duet.1" ] || install -Dm 644 <("${emulator[@]}" "$build/duet" man) "$usr/share/man/man1/duet.1"
   find "$usr/share/man" -name '*.1' -exec gzip -9n {} +
   rm -f "$usr/share/doc/duet/LICENSE"  # the same as the copyright of the package
   install -Dm 644 README.md "$usr/share/doc/duet/README.md"
@@ -89,7 +90,14 @@ if [ "${1:-}" = --source ]; then
 fi
 build=$(realpath "$1")
 out=$(realpath -m "$2")
+emulator=() libraries=()
+if [ -n "${DUET_SYSROOT:-}" ]; then
+  export DEB_HOST_ARCH=arm64
+  emulator=(qemu-aarch64-static -L "$DUET_SYSROOT")
+  libraries=(-l"$DUET_SYSROOT"/{usr/,}lib/aarch64-linux-gnu -L"$DUET_SYSROOT/../shlibs")
+fi
+architecture=$(dpkg-architecture -q DEB_HOST_ARCH 2>/dev/null)
 rm -rf "${out:?}"/{duet,libduet-dev} "$out"/*.deb
 mkdir -p "$out"
 program_package
-library_package
+[ -n "${DUET_SYSROOT:-}" ] || library_package
