@@ -43,7 +43,7 @@ class YieldingPartner {
   YieldingPartner(const HumanBody& human, double dt);
 
   void reset();
-  // What the person wants from here on: joints now and their velocities [m], [m/s], frame W.
+  // Sets where the person wants to be from here on: joints now and their velocities [m], [m/s], frame W.
   void lead(const HumanJoints& joints, const HumanJoints& velocities);
   // After a physics step: everybody has moved on, and these forces act next.
   void step(std::span<const Contact> contacts);

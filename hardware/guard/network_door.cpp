@@ -164,7 +164,7 @@ void NetworkLink::take(double now) {
     if (unseal(key_, std::span<const std::byte>(buffer).first(size), head, carried) != SealRefusal::kNone) continue;
     std::uint64_t echo = 0, largest = 0;
     if (head.kind == SealedKind::kTicket) {
-      // Of a hello of this run that was not answered yet: what was recorded before answers none of them.
+      // It has to answer a hello of this run that was not answered yet: what was recorded before answers none.
       if (!read_number(carried, echo) || !read_number(carried.subspan(sizeof(echo)), largest)) continue;
       if (echo <= answered_ || echo > hello_) continue;
       answered_ = echo;
@@ -180,7 +180,7 @@ void NetworkLink::take(double now) {
   }
 }
 
-// What came while the door does not answer goes nowhere: it would be old.
+// While the door does not answer, messages go nowhere: they would be old.
 void NetworkLink::pass_on(DatagramSocket& from, SealedKind kind, double now) {
   std::array<std::byte, kMostSealed> buffer;
   for (int k = 0; k < kMostAtOnce; ++k) {

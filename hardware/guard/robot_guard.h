@@ -77,7 +77,7 @@ class RobotGuard {
   void receive(const PersonMessage& message, double now);
   // Counts an estimate, and what became of it.
   void note_estimate(PersonFault fault) { ++status_.person[static_cast<std::size_t>(fault)]; }
-  // What came over the network so far.
+  // Datagrams that came over the network so far.
   void note_network(const NetworkCounts& counts) { status_.network = counts; }
   void receive(const OdometrySample& sample);
   void receive(const BatteryReading& battery, double now);

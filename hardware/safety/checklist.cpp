@@ -25,7 +25,7 @@ std::string time_text(double at) {
   return fmt::format("{:%Y-%m-%dT%H:%MZ}", fmt::gmtime(static_cast<std::time_t>(at)));
 }
 
-// Of "2026-11-28T10:15Z"; NaN for another form.
+// The time that "2026-11-28T10:15Z" says [s]; NaN for another form.
 double time_of(const std::string& text) {
   constexpr std::string_view kForm = "0000-00-00T00:00Z";
   bool good = text.size() == kForm.size();

@@ -52,7 +52,7 @@ struct Checklist {
   std::array<ChecklistAnswer, kChecklistItems> answers;
 };
 
-// What a configuration says of it.
+// A configuration's demand of a form.
 struct ChecklistDemand {
   std::string form;        // its path; empty: none is asked for
   double hours = 12.0;     // for which it is good

@@ -54,7 +54,7 @@ std::string text_of(const NetworkAddress& place) {
                      place.host & 255, place.port);
 }
 
-// What comes in a tenth of a second of a full network, as far as the system allows it.
+// A tenth of a second of a full network, as far as the system allows it.
 constexpr int kQueueBytes = 4 << 20;
 
 template <typename Address>

@@ -17,7 +17,7 @@ struct NetworkAddress {
   std::uint16_t port = 0;
   bool operator==(const NetworkAddress&) const = default;
 };
-// Of "HOST:PORT"; a host's name is looked up. Throws std::invalid_argument.
+// Reads "HOST:PORT"; a host's name is looked up. Throws std::invalid_argument.
 NetworkAddress network_address(const std::string& text);
 
 class DatagramSocket {

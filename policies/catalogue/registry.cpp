@@ -123,7 +123,7 @@ const Entry& find_entry(const std::string& name) {
   throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));
 }
 
-// What shipped policies and descriptors take beside their own options.
+// Options that shipped policies and descriptors take beside their own.
 struct CommonOptions {
   bool average = false, servo = false;
 };
