@@ -357,7 +357,7 @@ std::string no_data_fault(std::string_view first_bytes) {
 void refuse_no_data(const std::string& path, std::string_view first_bytes) {
   const std::string fault = no_data_fault(first_bytes);
   if (fault.empty() || (fault == kPage && (path.ends_with(".html") || path.ends_with(".htm")))) return;
-  throw InputError("'" + excerpt(path, kShownSentence) + "': " + fault);
+  throw InputError(fmt::format("'{}': {}", excerpt(path, kShownSentence), fault));
 }
 
 std::string_view without_byte_order_mark(std::string_view text) {

@@ -137,7 +137,7 @@ std::string shell_word(std::string_view text) {
 
 std::string shell_words(const std::vector<std::string>& words) {
   std::string line;
-  for (const std::string& word : words) line += (line.empty() ? "" : " ") + shell_word(word);
+  for (const std::string& word : words) line.append(line.empty() ? "" : " ").append(shell_word(word));
   return line;
 }
 

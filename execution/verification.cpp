@@ -326,8 +326,9 @@ std::string other_machine_sentence(const nlohmann::json& environment, const std:
   const std::string there = environment.value("machine", "");
   if (there.empty() || there == here) return "";
   return fmt::format(
-      "the rows were made on another machine ({}; this one: {}): networks sum in the order of its vector instructions, "
-      "and a contact amplifies the last bits",
+      "the rows were made on another machine ({}; this one: {}); processors with AVX2 and fused multiply-add give the "
+      "same "
+      "bits: compare the compiler, the libraries and the commit in the run's env.json with `duet doctor`",
       there, here);
 }
 

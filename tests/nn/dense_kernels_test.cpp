@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <vector>
 
@@ -68,6 +70,89 @@ TEST(DenseKernels, GemvEqualsDoubleWithAndWithoutBias) {
     EXPECT_LT((y.cast<double>() - product).cwiseAbs().maxCoeff(), tolerance(cols));
     kernels->gemv(rows, cols, W.data(), x.data(), b.data(), y.data());
     EXPECT_LT((y.cast<double>() - product - b.cast<double>()).cwiseAbs().maxCoeff(), tolerance(cols));
+  }
+}
+
+// The order of the sums, written out: sixteen lanes, folded; then the columns that are left over.
+float product_in_order(int cols, const float* w, const float* x, bool rounds_eight) {
+  std::array<float, 16> lanes = {};
+  int c = 0;
+  for (; c + 16 <= cols; c += 16)
+    for (int i = 0; i < 16; ++i) lanes[i] = std::fma(w[c + i], x[c + i], lanes[i]);
+  for (int half = 8; half > 0; half /= 2)
+    for (int i = 0; i < half; ++i) lanes[i] += lanes[i + half];
+  for (const int first = c; c < cols; ++c)
+    if (rounds_eight && cols - first >= 8 && c < first + 8) {
+      volatile const float product = w[c] * x[c];
+      lanes[0] += product;
+    } else {
+      lanes[0] = std::fma(w[c], x[c], lanes[0]);
+    }
+  return lanes[0];
+}
+
+std::vector<const DenseKernels*> levels_that_fuse() {
+  std::vector<const DenseKernels*> found = levels();
+  std::erase_if(found, [](const DenseKernels* kernels) {
+    return kernels->level != InstructionSet::kV3 && kernels->level != InstructionSet::kV4;
+  });
+  return found;
+}
+
+TEST(DenseKernels, SumsHaveOneOrderOnEveryProcessorThatFuses) {
+  constexpr int rows = 29;
+  for (const DenseKernels* kernels : levels_that_fuse())
+    for (const int cols : {1, 7, 8, 15, 16, 48, 93, 94, 456}) {
+      const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> W = random_matrix(rows, cols, 4);
+      const VectorXf x = random_matrix(cols, 1, 5), b = random_matrix(rows, 1, 6);
+      VectorXf y(rows), halves_y(rows);
+      kernels->gemv(rows, cols, W.data(), x.data(), b.data(), y.data());
+      const int filled = (cols + kHalfColumns - 1) / kHalfColumns * kHalfColumns;
+      VectorXf padded = VectorXf::Zero(filled);
+      padded.head(cols) = x;
+      std::vector<std::uint16_t> halves(half_size(rows, filled), 0);
+      for (int row = 0; row < rows; ++row)
+        for (int c = 0; c < cols; ++c) halves[half_index(row, c, filled)] = Eigen::half(W(row, c)).x;
+      kernels->gemv_half(rows, filled, halves.data(), padded.data(), b.data(), halves_y.data());
+      for (int row = 0; row < rows; ++row) {
+        EXPECT_EQ(y[row], b[row] + product_in_order(cols, W.row(row).data(), x.data(), true)) << cols << " " << row;
+        VectorXf rounded = VectorXf::Zero(filled);
+        for (int c = 0; c < cols; ++c) rounded[c] = static_cast<float>(Eigen::half(W(row, c)));
+        EXPECT_EQ(halves_y[row], b[row] + product_in_order(filled, rounded.data(), padded.data(), false)) << cols;
+      }
+    }
+}
+
+TEST(DenseKernels, AMatrixProductAddsItsTermsInOrderOnEveryProcessorThatFuses) {
+  constexpr int m = 67, n = 31, k = 45;
+  const MatrixXf A = random_matrix(m, k, 1), B = random_matrix(k, n, 2), start = random_matrix(m, n, 3);
+  const MatrixXf turned_a = A.transpose(), turned_b = B.transpose();
+  for (const DenseKernels* kernels : levels_that_fuse())
+    for (const bool ta : {false, true})
+      for (const bool tb : {false, true}) {
+        MatrixXf C = start;
+        kernels->gemm(ta, tb, m, n, k, (ta ? turned_a : A).data(), (tb ? turned_b : B).data(), C.data(), true);
+        for (int j = 0; j < n; ++j)
+          for (int i = 0; i < m; ++i) {
+            float sum = 0.0F;
+            for (int l = 0; l < k; ++l) sum = std::fma(A(i, l), B(l, j), sum);
+            ASSERT_EQ(C(i, j), start(i, j) + sum) << i << " " << j;
+          }
+      }
+}
+
+TEST(DenseKernels, EluAndAdamHaveOneResultOnEveryProcessorThatFuses) {
+  constexpr int n = 1000;
+  const VectorXf x = 20.0F * random_matrix(n, 1, 7), g = random_matrix(n, 1, 8);
+  for (const DenseKernels* kernels : levels_that_fuse()) {
+    VectorXf y = x, d = g, m = g, v = x.cwiseAbs(), p = x;
+    kernels->elu(n, y.data());
+    kernels->elu_backward(n, y.data(), d.data());
+    kernels->adam(n, g.data(), 0.3F, 0.01F, 0.1F, m.data(), v.data(), p.data());
+    std::uint64_t checksum = 14695981039346656037U;
+    for (const VectorXf* values : {&y, &d, &m, &v, &p})
+      for (const float value : *values) checksum = (checksum ^ std::bit_cast<std::uint32_t>(value)) * 1099511628211U;
+    EXPECT_EQ(checksum, 295425318120728464U) << to_string(kernels->level);
   }
 }
 
