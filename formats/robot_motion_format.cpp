@@ -45,13 +45,6 @@ void require_writable(const RobotMotion& motion, const RobotModel& robot, const 
   validate(motion, fmt::format("motion to be written as '{}'", format.name));
 }
 
-std::string layout_text(const RobotMotionFormat& format) {
-  const MotionLayout& layout = format.layout;
-  return fmt::format("{}, {}, {}, {}", layout.turns ? "turns xyz" : to_string(layout.quaternion),
-                     to_string(layout.joints), to_string(layout.angles),
-                     layout.metres == 1.0 ? "m" : fmt::format("{:g} m", layout.metres));
-}
-
 }  // namespace
 
 std::span<const RobotMotionFormat> robot_motion_formats() {
@@ -131,18 +124,14 @@ void write_robot_motion(const RobotMotion& motion, const RobotModel& robot, cons
   batch.put_in_place();
 }
 
-std::string robot_motion_table() {
-  std::string table =
-      "| name | what | files hold | quaternion, order, angles, length as documented | rate [Hz] | written | looked up "
-      "in; licence |\n|---|---|---|---|---|---|---|\n";
-  for (const RobotMotionFormat& format : robot_motion_formats())
-    table += fmt::format("| `{}` | {} | {} | {} | {} | {} | {}; {} |\n", format.name, format.about, format.holds,
-                         layout_text(format),
-                         format.layout.rate_hz == 0.0 ? "inside"
-                         : format.holds_rate          ? fmt::format("inside, else {:g}", format.layout.rate_hz)
-                                                      : fmt::format("{:g}", format.layout.rate_hz),
-                         format.write != nullptr ? "yes" : "no", format.evidence, format.licence);
-  return table;
+std::string documented_layout(const RobotMotionFormat& format) {
+  const MotionLayout& layout = format.layout;
+  return fmt::format("{}, {}, {}, {}; {}", layout.turns ? "turns xyz" : to_string(layout.quaternion),
+                     to_string(layout.joints), to_string(layout.angles),
+                     layout.metres == 1.0 ? "m" : fmt::format("{:g} m", layout.metres),
+                     layout.rate_hz == 0.0 ? "rate inside"
+                     : format.holds_rate   ? fmt::format("rate inside, else {:g} Hz", layout.rate_hz)
+                                           : fmt::format("{:g} Hz", layout.rate_hz));
 }
 
 }  // namespace duet

@@ -39,7 +39,7 @@ MotionFiles robot_motion_files(const RobotMotion& motion, const RobotModel& robo
 void write_robot_motion(const RobotMotion& motion, const RobotModel& robot, const RobotMotionFormat& format,
                         const std::string& path, const RobotMotionWriting& writing = {});
 
-// The table of the formats in Markdown, as it stands in docs/file-formats.md.
-std::string robot_motion_table();
+// Quaternion, order, angles, length and rate as the format documents them, for `duet list robot-formats`.
+std::string documented_layout(const RobotMotionFormat& format);
 
 }  // namespace duet

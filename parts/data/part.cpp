@@ -31,7 +31,8 @@ std::vector<Listed> list_robot_formats() {
   for (const RobotMotionFormat& format : robot_motion_formats()) {
     const bool written = format.write != nullptr;
     Listed entry{format.name, fmt::format("{}; {}", written ? "read and written" : "read", format.about)};
-    entry.options = {format.holds, fmt::format("looked up in {}; licence: {}", format.evidence, format.licence)};
+    entry.options = {format.holds, documented_layout(format),
+                     fmt::format("looked up in {}; licence: {}", format.evidence, format.licence)};
     entry.more = {{"written", written},
                   {"quaternion", to_string(format.layout.quaternion)},
                   {"joints", to_string(format.layout.joints)},

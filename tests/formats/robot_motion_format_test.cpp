@@ -194,9 +194,10 @@ TEST(RobotMotionFormat, TheExamplesAreReadAsTheKnownMotion) {
 
 // ---- the table itself
 
-TEST(RobotMotionFormat, TheTableOfTheDocumentationIsTheTable) {
-  const std::string page = read_file(std::string(DUET_SOURCE_DIR) + "/docs/file-formats.md");
-  EXPECT_NE(page.find(robot_motion_table()), std::string::npos) << "the table is now:\n" << robot_motion_table();
+TEST(RobotMotionFormat, TheLayoutIsSaidAsDocumented) {
+  EXPECT_EQ(documented_layout(robot_motion_format("gmr")), "xyzw, depth-first, rad, m; rate inside");
+  EXPECT_EQ(documented_layout(robot_motion_format("phc")), "xyzw, depth-first, rad, m; rate inside, else 30 Hz");
+  EXPECT_EQ(documented_layout(robot_motion_format("bones")), "turns xyz, depth-first, deg, 0.01 m; 120 Hz");
 }
 
 TEST(RobotMotionFormat, UnknownNamesAreRefusedWithTheNearest) {
