@@ -193,7 +193,7 @@ def conditions(folder):
 
 
 def partners(solid, yielding):
-    """Hugs, handshakes and high-fives that were won beside a partner whom nothing moves and beside one who gives way, touches over a limit, and hugs' peaks."""
+    """Hugs, handshakes and high-fives that were won beside a partner whom nothing moves and beside one who gives way, episodes of any task that only one of them lets win, touches over a limit, and hugs' peaks."""
     runs, table = [judged(solid), judged(yielding)], []
     touching = ("hug", "handshake", "high_five")
 
@@ -203,12 +203,18 @@ def partners(solid, yielding):
     for policy, name in policies_and_controls({row["policy"] for row, _ in runs[1]}).items():
         ours = [[(row, verdict) for row, verdict in rows if row["policy"] == policy] for rows in runs]
         won = [both(str(sum(v["success"] for r, v in rows if r["task"] == task)) for rows in ours) for task in touching]
+        winners = [{(r["clip"], r["seed"]) for r, v in rows if v["success"]} for rows in ours]
+        starts = [{(r["clip"], r["seed"]) for r, _ in rows} for rows in ours]
+        if starts[0] != starts[1]:
+            raise Refused(f"{yielding}: the episodes of {policy} are not those of {solid}")
+        only = f"{len(winners[1] - winners[0])} : {len(winners[0] - winners[1])}"
         touched = [[r for r, _ in rows if r["contact_peak_n"] > 0] for rows in ours]
         over = both(f"{sum(r['forces']['human.worst_ratio'] > 1 for r in rows)} of {len(rows)}" for rows in touched)
         peaks = [sorted(r["contact_peak_n"] for r in rows if r["task"] == "hug") for rows in touched]
         median = both(f"{statistics.median(some):.0f}" if some else "-" for some in peaks)
-        table.append([name, *won, over, median])
-    return markdown(["Policy", *[TASKS[task] for task in touching], "over a limit", "hugs' median peak [N]"], [False] + [True] * 5, table)
+        table.append([name, *won, only, over, median])
+    return markdown(["Policy", *[TASKS[task] for task in touching], "only yielding : only solid", "over a limit", "hugs' median peak [N]"],
+                    [False] + [True] * 6, table)
 
 
 def pictured(file):

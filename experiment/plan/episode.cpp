@@ -84,7 +84,7 @@ bool can_run_in(const std::string& engine) { return engine == kPlaybackEngine ||
 EpisodePlan::EpisodePlan(const Suite& suite, const Embodiments& bodies, const EpisodeFilter& part)
     : suite_(suite),
       bodies_(bodies),
-      suite_id_(suite.name + "@" + suite.version),
+      suite_id_(suite.draws_of.empty() ? suite.name + "@" + suite.version : suite.draws_of),
       combinations_(combinations_of(suite)),
       arms_(arms_of(suite)) {
   const std::vector<PairedMotion>& clips = bodies.clips();

@@ -180,6 +180,7 @@ struct Suite {
   std::vector<SuitePolicy> policies;
   std::vector<Perturbation> perturbations = {Perturbation{}};  // of engines; playback has none
   int episodes_per_clip = 1;
+  std::string draws_of = {};  // NAME@VERSION of the suite whose random numbers its episodes draw; empty: its own
   SuiteStart start = SuiteStart::kAuto;
   double start_radius = 1.0;  // of `approach` [m]
   SuitePartner partner = SuitePartner::kGhost;

@@ -334,9 +334,29 @@ void add_choices(Keys& keys) {
                              }));
 }
 
+SuiteKey draws_key() {
+  const Field<Suite> draws = field<Suite>(
+      {.name = "draws_of",
+       .meaning =
+           "another suite, NAME@VERSION: an episode starts as that one's of the same seed, task and clip and draws "
+           "the same noise, so that the rows of both stand in pairs"},
+      &Suite::draws_of);
+  SuiteKey key = plain_key(draws, With::kBoth, KeyForm::kQuotedUnlessEmpty);
+  key.rows.front().fallback = "itself";
+  key.read = [draws](const YamlSection& top, Suite& suite) {
+    read_field(top, draws, suite);
+    const std::size_t at = suite.draws_of.find('@');
+    checked(top, "draws_of", [&] {
+      require(suite.draws_of.empty() || (at != std::string::npos && at > 0 && at + 1 < suite.draws_of.size()),
+              "expected NAME@VERSION, as in hhoi-interaction@1.1.0, found '{}'", suite.draws_of);
+    });
+  };
+  return key;
+}
+
 Keys make_keys() {
   Keys keys = {schema_key()};
-  keys.reserve(28);
+  keys.reserve(29);
   keys.push_back(required_key(field<Suite>({.name = "name", .meaning = "what results are filed under"}, &Suite::name),
                               KeyForm::kAsIs));
   keys.push_back(
@@ -353,6 +373,7 @@ Keys make_keys() {
   keys.push_back(plain_key(field<Suite>(
       {.name = "episodes_per_clip", .meaning = "a suite has 10,000,000 episodes at most", .range = {.low = 1}},
       &Suite::episodes_per_clip)));
+  keys.push_back(draws_key());
   add_start_and_partner(keys);
   add_scheduler(keys);
   add_profile(keys);

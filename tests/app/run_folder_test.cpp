@@ -405,6 +405,20 @@ TEST(EpisodePlan, ArmsOfAClipFollowOneAnotherAndEachEpisodeIsMadeWhenItIsAskedFo
               HasSubstr("expected at most 10000000 episodes, found 12000000"));
 }
 
+TEST(EpisodePlan, ASuiteMayDrawAsAnotherOneDoes) {
+  const auto seed_of_first = [](const std::string& name, const std::string& draws_of) {
+    Suite suite = test::playback_suite();
+    suite.name = name;
+    suite.draws_of = draws_of;
+    Embodiments bodies(suite);
+    Progress quiet(Progress::Style::kQuiet);
+    bodies.take_clips(prepare_clips(suite, *bodies.nominal(), 1, quiet));
+    return EpisodePlan(suite, bodies).at(0).seed;
+  };
+  EXPECT_NE(seed_of_first("other", ""), seed_of_first("test", ""));
+  EXPECT_EQ(seed_of_first("other", "test@1.0.0"), seed_of_first("test", ""));
+}
+
 // Its specs point into the experiment: it stays where it is.
 TEST(Experiment, AndItsPlanCannotBeMovedOrCopied) {
   EXPECT_FALSE(std::is_move_constructible_v<Experiment> || std::is_move_assignable_v<Experiment>);

@@ -118,8 +118,9 @@ TEST(Suite, UnknownEngineControllerAndPolicyAreRefused) {
 }
 
 TEST(Suite, ValuesOutOfRangeAreRefused) {
-  for (const char* text : {"dt: 0.003\n", "dt: -1\n", "episodes_per_clip: 0\n", "episodes_per_clip: 1.5\n",
-                           "start_radius: 9\n", "fuse_ticks: 91\n", "limits: {wall_s_per_episode: 0}\n", "seed: -4\n"})
+  for (const char* text :
+       {"dt: 0.003\n", "dt: -1\n", "episodes_per_clip: 0\n", "episodes_per_clip: 1.5\n", "start_radius: 9\n",
+        "fuse_ticks: 91\n", "limits: {wall_s_per_episode: 0}\n", "seed: -4\n", "draws_of: core\n"})
     EXPECT_SENTENCE(refusal(text));
 }
 
