@@ -30,6 +30,8 @@ def unless(condition):
 
 LIMITER = 'HomieExecutor.*:Limiter.*:LimiterBesideAPerson.*:AxisLimit.*:HardwareLimits.*'
 MACHINE = 'SafetySignals.*:SafetyMachine.*'
+SEALED = 'SealedDatagram.*:SealGate.*:NetworkKey.*'
+DOOR = 'NetworkDoor.*:OpenDoor.*'
 GUARD = 'RobotGuard.*:FaultMatrix.*:FaultSweep.*:Executor.*:RobotConnection.*'
 
 # (name, (old, new)) by file and suites.
@@ -222,6 +224,31 @@ EDITS = {
         ('guard message: version', unless('head.version != kVersion')),
         ('guard message: length', ('if (datagram.size() != sizeof(body)) return false;\n  std::memcpy(&body, datagram.data(), sizeof(body));\n  return', 'if (!REMOVED && datagram.size() != sizeof(body)) return false;\n  std::memcpy(&body, datagram.data(), sizeof(body));\n  return')),
     ],
+    ('hardware/wire/sealed_datagram.cpp', SEALED): [
+        ('seal kShort', unless('datagram.size() < kSealedHeadBytes + kSealBytes')),
+        ('seal kLong', unless('datagram.size() > kMostSealedBytes')),
+        ('seal kVersion', unless('wire.version != kSealedVersion')),
+        ('seal kForged', unless('CRYPTO_memcmp(expected.data(), datagram.last(kSealBytes).data(), kSealBytes) != 0')),
+        ('seal kKind', unless('wire.kind == 0 || wire.kind > kSealedKinds')),
+        ('gate kSender', unless('head.sender >= kMostSenders')),
+        ('gate kTicket', unless('microseconds(now) - (head.ticket - secret_) > microseconds(kTicketLife)')),
+        ('gate kRepeated', unless('found != streams_.end() && head.sequence <= found->second.sequence')),
+        ('gate kClock that is not finite', choice('!std::isfinite(head.clock)', 'false')),
+        ('gate kClock that falls', choice('(goes_on && head.clock <= found->second.clock)', 'false')),
+        ('gate kLate', unless('stream.delay.see(head.clock, now) > kLatestDatagram')),
+        ('key that others may read', unless('(found.st_mode & 077) != 0')),
+    ],
+    ('hardware/guard/network_door.cpp', DOOR): [
+        ('door: the seal', ('carried); refusal != SealRefusal::kNone) return refusal;',
+                            'carried); !REMOVED && refusal != SealRefusal::kNone) return refusal;')),
+        ('door: kinds for the guard alone', unless('!is_for_the_guard(head.kind)')),
+        ('door: the gate', ('gate_.takes(head, now); refusal != SealRefusal::kNone)',
+                            'gate_.takes(head, now); !REMOVED && refusal != SealRefusal::kNone)')),
+        ('door: kUnwanted', choice('peer.send(carried, now)', '(static_cast<void>(peer.send(carried, now)), true)')),
+        ('link: a hello is answered once', unless('echo <= answered_ || echo > hello_')),
+        ('link: reports of this run alone', unless('head.ticket != nonce_ || head.sequence <= from_guard_')),
+        ('link: nothing is sent to a door that is silent', choice('silence(now) <= kTicketLife', 'true')),
+    ],
 }
 
 # The value of each limit with which the limit is missing.
@@ -299,6 +326,7 @@ def check_complete(table):
 
     missing += [n for n in enumerators('hardware/safety/limiter.h', 'ClampReason', ()) if not re.search(rf'\b{n}\b', names)]
     missing += [n for n in enumerators('hardware/safety/safety_machine.h', 'StopCause', ('kNone',)) if not re.search(rf'\b{n}\b', names)]
+    missing += [n for n in enumerators('hardware/wire/sealed_datagram.h', 'SealRefusal', ('kNone',)) if not re.search(rf'\b{n}\b', names)]
     limits = re.findall(r'"(\w+)", &Limits::', pathlib.Path('hardware/safety/limits.cpp').read_text())
     missing += [n for n in limits if f'limit {n}' not in [g.name for g in table]]
     rules = re.search(r'struct SafetyRules {(.*?)^};', pathlib.Path('hardware/safety/safety_machine.h').read_text(), re.S | re.M)[1]

@@ -9,6 +9,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "duet/core/digest.h"
@@ -47,10 +48,14 @@ class Tap {
     }
     for (; !waiting_.empty() && waiting_.front().first <= now; waiting_.pop_front())
       (void)door_->send(waiting_.front().second);
-    while (const std::size_t size = door_->receive(buffer)) (void)here_.send_to(from_, std::span(buffer).first(size));
+    while (const std::size_t size = door_->receive(buffer)) {
+      answers.emplace_back(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size));
+      answer(answers.back());
+    }
   }
+  void answer(const Datagram& datagram) { (void)here_.send_to(from_, datagram); }
 
-  std::vector<Datagram> seen;  // on their way to the door
+  std::vector<Datagram> seen, answers;  // on their way to the door, and from it
   std::function<bool(const Datagram&)> loses;
   double delay = 0.0;  // [s]
 
@@ -338,6 +343,24 @@ TEST(NetworkDoor, APersonAndATrackerReachTheirSocketsOrNobody) {
   EXPECT_EQ(camera.receive(received), kPersonBytes);
   EXPECT_EQ(received, person);
   EXPECT_EQ(poses.receive(received), 104u);
+}
+
+TEST(NetworkDoor, AnAnswerThatWasRecordedIsHeardOnce) {
+  RemotePlanner remote;
+  SocketGuardLink planner(remote.there.guard, 0.001);
+  remote.run_for(1.0);
+  const long received = remote.link->received();
+  const std::vector<Datagram> recorded = std::exchange(remote.tap->answers, {});
+  ASSERT_GT(received, 10);
+  remote.tap->loses = [](const Datagram&) { return true; };  // the door is not asked any more
+  remote.run_for(0.1);
+  const long before = remote.link->received();
+  remote.attack = [&] {
+    for (std::size_t k = recorded.size() - 5; k < recorded.size(); ++k) remote.tap->answer(recorded[k]);
+  };
+  remote.run_for(1.5);
+  EXPECT_GT(remote.link->silence(remote.robot.now), kTicketLife) << "old tickets are no sign of a door";
+  EXPECT_LE(remote.link->received() - before, 60) << "a second of reports may come that were asked for";
 }
 
 // What only the guard sends does not come back to it.
