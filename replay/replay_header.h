@@ -13,7 +13,7 @@
 namespace duet {
 
 // The numbers of a replay page: blocks of columns over time, quantised to 16 bits and stored as second differences,
-// which a deflater makes small. viewer/src/columns.ts reads them; docs/file-formats.md ("Replay page") has the layout.
+// which a deflater makes small. viewer/src/columns.ts reads them.
 class ReplayColumns {
  public:
   // A block of K columns of T values each; `values` is (T, K). A value is kept to half of `step`, or, in a column whose
