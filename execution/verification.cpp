@@ -322,14 +322,23 @@ void with_episode(const Run& run, const std::string& key, const VerifyOptions& o
   use(verifier.experiment(), verifier.spec_of(key));
 }
 
-std::string other_machine_sentence(const nlohmann::json& environment, const std::string& here) {
-  const std::string there = environment.value("machine", "");
-  if (there.empty() || there == here) return "";
-  return fmt::format(
-      "the rows were made on another machine ({}; this one: {}); processors with AVX2 and fused multiply-add give the "
-      "same "
-      "bits: compare the compiler, the libraries and the commit in the run's env.json with `duet doctor`",
-      there, here);
+std::string other_maker_sentences(const nlohmann::json& there, const nlohmann::json& here) {
+  const auto differs = [&](const char* key) {
+    const nlohmann::json::json_pointer at(key);
+    const std::string theirs = there.value(at, ""), ours = here.value(at, "");
+    return !theirs.empty() && theirs != ours ? std::pair(theirs, ours) : std::pair<std::string, std::string>();
+  };
+  std::string text;
+  if (const auto machines = differs("/machine"); !machines.first.empty())
+    text += fmt::format(
+        "the rows were made on another machine ({}; this one: {}); processors with AVX2 and fused multiply-add give "
+        "the "
+        "same bits: compare the compiler and the libraries in the run's env.json with `duet doctor`",
+        machines.first, machines.second);
+  if (const auto commits = differs("/build/commit"); !commits.first.empty())
+    text += fmt::format("{}the rows were made by the program of commit {:.12}, this one is of {:.12}",
+                        text.empty() ? "" : "\n", commits.first, commits.second);
+  return text;
 }
 
 }  // namespace duet

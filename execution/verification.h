@@ -50,9 +50,9 @@ struct Verification {
   [[nodiscard]] int rows_not_run() const;
 };
 
-// A sentence for rows that differ: that they were made on another machine than `here` (describe_machine()); "" where it
-// is the same, or where the run does not say.
-std::string other_machine_sentence(const nlohmann::json& environment, const std::string& here);
+// Sentences for rows that differ: that they were made on another machine, or by a program of another commit, than `here`
+// (both as capture_environment() has them); "" where neither, or where the run does not say.
+std::string other_maker_sentences(const nlohmann::json& there, const nlohmann::json& here);
 
 // Throws InputError where the run's inputs, suite, detectors, policies or controllers are not what run.json says or not
 // what this machine has (which, expected, found), MissingError for a network that is not there.

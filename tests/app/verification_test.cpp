@@ -385,12 +385,17 @@ TEST(Verification, APartOfASuiteIsWholeInItself) {
   EXPECT_EQ(objection(folder / "run"), "");
 }
 
-TEST(OtherMachineSentence, NamesBothAndIsEmptyWhereTheyAreTheSame) {
-  const nlohmann::json environment = {{"machine", "EPYC, AVX-512"}};
-  EXPECT_THAT(other_machine_sentence(environment, "EPYC, AVX2"),
-              AllOf(HasSubstr("(EPYC, AVX-512; this one: EPYC, AVX2)")));
-  EXPECT_THAT(other_machine_sentence(environment, "EPYC, AVX-512"), IsEmpty());
-  EXPECT_THAT(other_machine_sentence(nlohmann::json::object(), "EPYC, AVX2"), IsEmpty());
+TEST(OtherMakerSentences, NameMachineAndCommitAndAreEmptyWhereTheyAreTheSame) {
+  const auto made = [](const std::string& machine, const std::string& commit) {
+    return nlohmann::json{{"machine", machine}, {"build", {{"commit", commit}}}};
+  };
+  const nlohmann::json there = made("EPYC, AVX-512", "0123456789abcdef");
+  EXPECT_THAT(other_maker_sentences(there, made("EPYC, AVX2", "0123456789abcdef")),
+              AllOf(HasSubstr("(EPYC, AVX-512; this one: EPYC, AVX2)"), Not(HasSubstr("commit 0"))));
+  EXPECT_EQ(other_maker_sentences(there, made("EPYC, AVX-512", "fedcba9876543210")),
+            "the rows were made by the program of commit 0123456789ab, this one is of fedcba987654");
+  EXPECT_THAT(other_maker_sentences(there, there), IsEmpty());
+  EXPECT_THAT(other_maker_sentences(nlohmann::json::object(), there), IsEmpty());
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 """cmake/figures.py: a table that is not what its source prints is found, and what cannot be made is refused in one sentence."""
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -84,10 +85,10 @@ class Figures(unittest.TestCase):
         self.assertIn("| Hug | Handshake |", lines[2])
         for line in lines[4:-2]:
             for cell in line.split(" | ")[1:]:
-                before, after = cell.rstrip(" |").split(" → ")
+                before, after = re.split(" → | : ", cell.rstrip(" |"))
                 self.assertEqual(before, after)
         replay = next(line for line in lines if line.startswith("| replay (knows the motion) |"))
-        self.assertIn("| 4 → 4 | 0 → 0 | 4 → 4 | 24 of 33 → 24 of 33 |", replay)
+        self.assertIn("| 4 → 4 | 0 → 0 | 4 → 4 | 0 : 0 | 24 of 33 → 24 of 33 |", replay)
 
     def test_a_command_that_fails_is_refused_with_what_it_said(self):
         self.assertIn("ended with 1", self.refused(f"<!-- figures: duet list -->\n{END}\n", "--program", "/bin/false"))
