@@ -1,8 +1,14 @@
 // Laws of free bodies, of one joint under the torque law and of the repeatability of runs in every engine.
+#include <gmock/gmock.h>
+
 #include <cmath>
+#include <cstdlib>
 #include <thread>
 
 #include "duet/backends/engine_module.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "tests/backends/allocation_count.h"
 #include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
@@ -12,6 +18,7 @@
 namespace duet {
 namespace {
 
+using engine_layout::Digest;
 using test::fall;
 using test::Trace;
 
@@ -207,6 +214,119 @@ TEST_P(Engine, ContinuesBitwiseFromASnapshotInTheMiddleOfAFallAndAfterIt) {
     fresh->restore(snapshot);
     EXPECT_TRUE(same(fall(*fresh, begin, begin + 600), first)) << begin;
     EXPECT_EQ(fresh->time(), (begin + 600) * scene.dt);
+  }
+}
+
+struct Old {
+  double mass = 0.0;
+  int link = 0;
+};
+struct Reordered {
+  int link = 0;
+  double mass = 0.0;
+};
+struct Longer {
+  double mass = 0.0;
+  int link = 0;
+  std::string region;
+};
+struct Narrower {
+  float mass = 0.0F;
+  int link = 0;
+};
+
+template <typename T>
+std::uint64_t layout_of() {
+  Digest digest;
+  digest.add_type(&T::mass, &T::link);
+  return digest.value();
+}
+
+TEST(EngineInterface, ChangesWithTheOrderSizeAndNumberOfMembers) {
+  EXPECT_EQ(layout_of<Old>(), layout_of<Old>());
+  for (const std::uint64_t other : {layout_of<Reordered>(), layout_of<Longer>(), layout_of<Narrower>()})
+    EXPECT_NE(layout_of<Old>(), other);
+}
+
+struct Interface {
+  virtual ~Interface() = default;
+  virtual void first() = 0;
+};
+struct WithOneMore : Interface {
+  virtual void second() = 0;
+};
+struct AfterInterface : Interface {
+  virtual void after() = 0;
+};
+struct AfterOneMore : WithOneMore {
+  virtual void after() = 0;
+};
+
+TEST(EngineInterface, ChangesWithTheNumberOfVirtualFunctions) {
+  EXPECT_EQ(Digest::first_word(&AfterOneMore::after) - Digest::first_word(&AfterInterface::after), sizeof(void*));
+}
+
+TEST(EngineInterface, IsOneNumberInOneProgram) { EXPECT_EQ(engine_interface(), EngineModule().interface); }
+
+// The modules of this test stand in folders of their own.
+TEST(EngineFolders, AModuleThatWasCompiledAgainstOtherTypesIsRefusedByOneSentence) {
+  setenv("DUET_ENGINES", DUET_STRANGE_ENGINES ":" DUET_BUILT_ENGINES, 1);
+  Scene scene;
+  scene.robot = test::sledge();
+  const std::string message = test::thrown_message<MissingError>([&] { make_backend("stranger", scene); });
+  EXPECT_THAT(message, ::testing::MatchesRegex(
+                           "engine 'stranger' is absent: .*/duet_stranger\\.so was compiled against other types "
+                           "\\(interface [0-9a-f]{16}, duet [0-9.]+ has [0-9a-f]{16}\\): compile it again with the "
+                           "headers and the compiler flags of this duet"));
+  int strangers = 0, shipped = 0;
+  for (const EngineInfo& info : engines()) {
+    strangers += info.name == "stranger";
+    shipped += info.available;
+    EXPECT_FALSE(info.available && info.name == "stranger");
+  }
+  EXPECT_EQ(strangers, 1);
+  if (shipped == 0) GTEST_SKIP() << "not run: engines absent";
+}
+
+TEST(Allocation, IsCounted) {
+  if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: malloc belongs to the sanitizer";
+  const long before = test::allocation_count();
+  const auto value = std::make_unique<std::vector<double>>(10);
+  EXPECT_GE(test::allocation_count(), before + 2);
+}
+
+// The allocations of an engine's own library, per step at most; our code adds none.
+long allowed_per_step(const std::string& engine) {
+  if (engine == "dart") return 2000;   // libdart's recursions and assertions
+  if (engine == "ode") return 4;       // its memory grows with more contacts than were reserved for
+  if (engine == "simbody") return 20;  // its State, where a stage is realised
+  return 0;
+}
+
+TEST(Allocation, StepMakesNoneButWhatAnEnginesLibraryDoes) {
+  if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: malloc belongs to the sanitizer";
+  std::array<double, 24> bones{};
+  bones.fill(0.2);
+  for (const EngineInfo& info : engines()) {
+    if (!info.available) continue;
+    Scene scene = test::g1_scene(PartnerMode::kSolid);
+    scene.human = make_human_body(bones);
+    const auto backend = make_backend(info.name, scene);
+    const RobotState state = scene.robot->standing_state();
+    backend->reset(state);
+    const JointCommand command = scene.robot->default_command(scene.robot->neutral);
+    HumanJoints joints = HumanJoints::Constant(0.3);  // a pole before the robot
+    joints.row(2).setLinSpaced(0.1, 1.3);
+    const HumanJoints velocities = HumanJoints::Constant(0.01);
+    backend->set_partner(joints, velocities);  // the first call after a reset checks the start
+    const long before = test::allocation_count();
+    constexpr int kSteps = 500;  // through the fall: contacts of every kind
+    for (int i = 0; i < kSteps; ++i) {
+      backend->set_partner(joints, velocities);
+      backend->push(0, {1.0, 0.0, 0.0}, state.X_WB.p);
+      backend->step(command);
+    }
+    EXPECT_LE(test::allocation_count() - before, kSteps * allowed_per_step(info.name)) << info.name;
   }
 }
 

@@ -1,12 +1,17 @@
 #include "duet/core/file.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <fstream>
 #include <vector>
 
+#include "duet/core/file_batch.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "tests/file_size_limit.h"
 #include "tests/support.h"
@@ -17,6 +22,8 @@ namespace {
 using test::FileSizeLimit;
 using test::ScratchFolder;
 using test::thrown_message;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 std::vector<std::string> names_in(const ScratchFolder& folder) {
   std::vector<std::string> names;
@@ -226,6 +233,64 @@ TEST(LineAppender, RefusesANewlineAndAFolder) {
             "'" + (folder / "lines") + "': a line must not hold a newline");
   EXPECT_EQ(thrown_message<InputError>([&] { LineAppender appender(folder / ""); }),
             "cannot write '" + (folder / "") + "': Is a directory");
+}
+
+template <typename Error>
+std::string told(const std::string& message) {
+  return thrown_message<InputError>([&] { with_file_context("a.npz", [&] { throw Error(message); }); });
+}
+
+TEST(NamingFile, PutsTheFileBeforeWhatDoesNotNameIt) {
+  EXPECT_SENTENCE(told<InputError>("nothing pairs"));
+  EXPECT_SENTENCE(told<std::invalid_argument>("expected frames"));
+  EXPECT_SENTENCE(told<InputError>("'a.npz': key 'b'"));
+}
+
+TEST(NamingFile, SaysThatThereIsNotEnoughMemoryForAFile) {
+  EXPECT_SENTENCE(thrown_message<InputError>([] { with_file_context("a.npz", [] { throw std::bad_alloc(); }); }));
+}
+
+TEST(NamingFile, LetsValuesAndOtherExceptionsThrough) {
+  int value = 3;
+  EXPECT_EQ(&with_file_context("a.npz", [&]() -> int& { return value; }), &value);
+  EXPECT_EQ(thrown_message<MissingError>([] { with_file_context("a.npz", [] { throw MissingError("no engine"); }); }),
+            "no engine");
+  EXPECT_EQ(thrown_message<StorageError>([] { with_file_context("a.npz", [] { throw StorageError("disk full"); }); }),
+            "disk full");
+}
+
+TEST(MemoryLeft, IsTheLeastOfMachineAndGroups) {
+  const test::ScratchFolder folder;
+  const std::string root = folder / "root";
+  write_file(root + "/proc/meminfo", "MemTotal:  4000000 kB\nMemAvailable:  2000000 kB\nSwapTotal: 0 kB\n");
+  EXPECT_DOUBLE_EQ(memory_left(root), 2048.0e6);
+  write_file(root + "/proc/self/cgroup", "3:cpu:/x\n0::/user/job\n");
+  write_file(root + "/sys/fs/cgroup/user/memory.max", "max\n");
+  write_file(root + "/sys/fs/cgroup/user/memory.current", "5\n");
+  EXPECT_DOUBLE_EQ(memory_left(root), 2048.0e6);
+  write_file(root + "/sys/fs/cgroup/user/job/memory.max", "900000000\n");
+  write_file(root + "/sys/fs/cgroup/user/job/memory.current", "700000000\n");
+  EXPECT_DOUBLE_EQ(memory_left(root), 200.0e6);
+  write_file(root + "/sys/fs/cgroup/user/job/memory.stat", "anon 600000000\ninactive_file 100000000\n");
+  EXPECT_DOUBLE_EQ(memory_left(root), 300.0e6);
+  write_file(root + "/sys/fs/cgroup/user/memory.max", "4\n");  // a group above it
+  EXPECT_DOUBLE_EQ(memory_left(root), 0.0);
+}
+
+TEST(MemoryLeft, KnowsTheFirstVersionOfGroups) {
+  const test::ScratchFolder folder;
+  const std::string root = folder / "root";
+  write_file(root + "/sys/fs/cgroup/memory/memory.limit_in_bytes", "1000000000\n");
+  write_file(root + "/sys/fs/cgroup/memory/memory.usage_in_bytes", "400000000\n");
+  write_file(root + "/sys/fs/cgroup/memory/memory.stat", "inactive_file 1\ntotal_inactive_file 100000000\n");
+  EXPECT_DOUBLE_EQ(memory_left(root), 700.0e6);
+}
+
+TEST(RequireMemory, SaysWhatNeedsItBeforeTheWork) {
+  EXPECT_NO_THROW(require_memory("clip 'a': 5 frames", 1e5));
+  const std::string told = test::thrown_message<InputError>([] { require_memory("clip 'hour': 180000 frames", 1e18); });
+  EXPECT_THAT(told, HasSubstr("clip 'hour': 180000 frames need about 1000000000.0 GB of memory, and "));
+  EXPECT_THAT(told, HasSubstr(" GB are left"));
 }
 
 }  // namespace

@@ -1,9 +1,12 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "duet/core/require.h"
 
 namespace duet {
 namespace {
+
+using ::testing::ElementsAre;
 
 TEST(Shown, LeavesPlainTextAlone) {
   EXPECT_EQ(excerpt(""), "");
@@ -49,6 +52,67 @@ TEST(CodePointAt, ReadsEachLengthAndRefusesShorterForms) {
   EXPECT_EQ(code_point_at("🤝", 0)->code, U'🤝');
   EXPECT_FALSE(code_point_at("\xe0\x80\x80", 0));
   EXPECT_FALSE(code_point_at("\xc3", 0));
+}
+
+TEST(Split, GivesOnePartMoreThanThereAreMarks) {
+  EXPECT_THAT(split("a,b,c", ','), ElementsAre("a", "b", "c"));
+  EXPECT_THAT(split("one", ','), ElementsAre("one"));
+  EXPECT_THAT(split("a b:c", ':'), ElementsAre("a b", "c"));
+}
+
+TEST(Split, KeepsEmptyParts) {
+  EXPECT_THAT(split("", ','), ElementsAre(""));
+  EXPECT_THAT(split(",", ','), ElementsAre("", ""));
+  EXPECT_THAT(split("a,,b,", ','), ElementsAre("a", "", "b", ""));
+}
+
+TEST(Trimmed, LosesBlanksAtBothEndsAndNoneBetween) {
+  EXPECT_EQ(trimmed(" \t a b\t\r"), "a b");
+  EXPECT_EQ(trimmed("a b"), "a b");
+  EXPECT_EQ(trimmed("x"), "x");
+}
+
+TEST(Trimmed, IsEmptyWhereNothingElseIsThere) {
+  EXPECT_EQ(trimmed(""), "");
+  EXPECT_EQ(trimmed(" \r\t "), "");
+}
+
+TEST(Trimmed, LosesTheMarksAskedForAlone) {
+  EXPECT_EQ(trimmed("\"a\"", "\""), "a");
+  EXPECT_EQ(trimmed(" a\n"), "a\n") << "a line end is no blank of a line";
+  EXPECT_EQ(trimmed("\ta \n", " \n"), "\ta");
+}
+
+TEST(Number, IsTheWholeText) {
+  EXPECT_EQ(parse_number("0.25"), 0.25);
+  EXPECT_EQ(parse_number("-3e2"), -300.0);
+  for (const char* text : {"", " 1", "1 ", "1,5", "0.5m", "nan", "inf", "1e999", "+1", "one"})
+    EXPECT_EQ(parse_number(text), std::nullopt) << text;
+}
+
+TEST(WithShortNames, CutsNamesInTheirMiddlesAndNothingElse) {
+  const std::string sentence =
+      "unknown task 'hugg': did you mean 'hug'? Known: hug, handshake and many more, it's said";
+  EXPECT_EQ(with_short_names(sentence, 10), sentence);
+  EXPECT_EQ(with_short_names("cannot read '" + std::string(50, 'a') + "z': no", 10), "cannot read 'aaaa...aaaz': no");
+  EXPECT_EQ(with_short_names(std::string(50, 'a'), 10), "aaaaa...aaaaa");
+  EXPECT_EQ(with_short_names("", 10), "");
+}
+
+TEST(WithShortNames, TakesAQuotedNameWithSpacesForOne) {
+  std::string path;
+  for (int i = 0; i < 100; ++i) path += "/my folder";
+  const std::string told = with_short_names("cannot read '" + path + "': No such file; again '" + path + "'");
+  EXPECT_LT(told.size(), 900U);
+  EXPECT_TRUE(told.starts_with("cannot read '/my folder/my folder")) << told;
+  EXPECT_NE(told.find("/my folder': No such file; again '/my"), std::string::npos) << told;
+}
+
+TEST(WithShortNames, CutsNoCharacterInTwo) {
+  std::string name;
+  for (int i = 0; i < 400; ++i) name += "ü";
+  for (std::size_t most = 20; most < 24; ++most)
+    EXPECT_EQ(excerpt(with_short_names(name, most)).find("\\x"), std::string::npos) << most;
 }
 
 }  // namespace

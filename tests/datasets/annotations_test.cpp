@@ -1,13 +1,19 @@
 #include "duet/datasets/annotations.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "duet/core/require.h"
+#include "duet/datasets/labelled/detector_confusion.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
+
+using ::testing::ElementsAre;
 
 constexpr const char* kHeader = "clip,task,reactor,act_begin_s,act_end_s,note\n";
 
@@ -95,6 +101,56 @@ TEST(Annotations, LineEndsOfOtherSystemsAreTaken) {
   const Annotations read =
       parse_annotations("clip,task,reactor,act_begin_s,act_end_s,note\r\na,hug,B,1,2,fine\r\n", "f");
   EXPECT_EQ(read.at("a").note, "fine");
+}
+
+std::string refusal_of_labels(const std::string& text) {
+  return test::thrown_message<InputError>([&] { (void)parse_clip_labels(text, "labels.csv"); });
+}
+
+TEST(ClipLabels, AreReadWithWhatPeopleTypeAroundThem) {
+  EXPECT_EQ(parse_clip_labels("clip,label\nfirst,Shake hands\n\n second , hug \r\nthird,\n", "labels.csv"),
+            (ClipLabels{{"first", "Shake hands"}, {"second", "hug"}, {"third", ""}}));
+  EXPECT_EQ(parse_clip_labels("\xef\xbb\xbf"
+                              "clip,label\r\na,b",
+                              "labels.csv"),
+            (ClipLabels{{"a", "b"}}));
+  EXPECT_TRUE(parse_clip_labels("clip,label", "labels.csv").empty());
+}
+
+TEST(ClipLabels, RefusalsNameFileLineExpectedAndFound) {
+  for (const char* text : {"", "clip;name\n", "clip,label\na\n", "clip,label\na,b\nc,d,e\n", "clip,label\n,hug\n",
+                           "clip,label\na,hug\na,wave\n"})
+    EXPECT_SENTENCE(refusal_of_labels(text));
+  EXPECT_SENTENCE(test::thrown_message<InputError>([] { (void)read_clip_labels("/nowhere/labels.csv"); }));
+}
+
+TEST(PhaseErrors, TheTableIsOfTheirSizes) {
+  const std::vector<PhaseError> errors = {{.task = Task::kHug, .begin = -0.2, .end = 0.4, .overlap = 0.8},
+                                          {.task = Task::kHug, .begin = 0.4, .end = 0.0, .overlap = 1.0},
+                                          {.task = Task::kWave, .begin = 0.0, .end = -1.0, .overlap = 0.5}};
+  const TextTable table = phase_error_table(errors);
+  ASSERT_EQ(table.rows.size(), 3U);
+  EXPECT_THAT(table.rows[0], ElementsAre("hug", "2", "0.30", "0.38", "0.20", "0.36", "0.90"));
+  EXPECT_THAT(table.rows[1], ElementsAre("wave", "1", "0.00", "0.00", "1.00", "1.00", "0.50"));
+  EXPECT_EQ(table.rows[2][1], "3");
+}
+
+TEST(PhaseErrors, ProposalsFindTheActThatSynthesisKnows) {
+  const std::vector<PhaseError> errors = phase_errors(kPaperTasks, 3, 11, 2);
+  ASSERT_EQ(errors.size(), 18U);
+  for (const PhaseError& error : errors) {
+    EXPECT_GT(error.overlap, 0.7) << to_string(error.task);
+    EXPECT_LT(std::abs(error.begin), 1.5) << to_string(error.task);
+    EXPECT_LT(std::abs(error.end), 1.5) << to_string(error.task);
+  }
+}
+
+TEST(PhaseErrors, DoNotDependOnTheThreads) {
+  const std::vector<PhaseError> one = phase_errors(kPaperTasks, 2, 3, 1), four = phase_errors(kPaperTasks, 2, 3, 4);
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(one[i].begin, four[i].begin);
+    EXPECT_EQ(one[i].end, four[i].end);
+  }
 }
 
 }  // namespace

@@ -1,9 +1,20 @@
 #include "duet/motion/layouts/joint_layout.h"
 
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/motion/layouts/joint_recipes.h"
+#include "duet/motion/people/source_clip.h"
 #include "duet/motion/synthesis/synthesis.h"
+#include "duet/tasks/synthesis/posed_body.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -188,6 +199,79 @@ TEST(JointLayout, AFileOfNamesIsASkeleton) {
   EXPECT_EQ(read_joint_layout("coco-17").name, "coco-17");
   EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { (void)read_joint_layout("coco-18"); }));
   EXPECT_SENTENCE(thrown_message<std::invalid_argument>([] { (void)joint_layout("kinect-16"); }));
+}
+
+// The table of the 24 joints in docs/file-formats.md is that of the code.
+
+constexpr double kStature = 1.75;      // [m] of the table
+constexpr double kRounded = 0.005001;  // [m]
+
+// Standing straight in the T pose, the origin on the ground below the pelvis.
+std::array<Eigen::Vector3d, kSmplJoints> standing() {
+  const synthesis::Body body = synthesis::make_body(kStature, {});
+  std::array<Eigen::Vector3d, kSmplJoints> p;
+  const double legs = body.leg() + body.ankle_height() - body.offset[kLeftHip].z();
+  p[kPelvis] = {0.0, 0.0, legs};
+  for (int j = 1; j < kSmplJoints; ++j) p[j] = p[kSmplParents[j]] + body.offset[j];
+  return p;
+}
+
+TEST(JointTable, OfTheDocsIsTheCodes) {
+  const std::array<Eigen::Vector3d, kSmplJoints> positions = standing();
+  std::istringstream lines(read_file(fmt::format("{}/docs/file-formats.md", DUET_SOURCE_DIR)));
+  int found = 0;
+  for (std::string line; std::getline(lines, line);) {
+    int joint = -1;
+    std::array<char, 32> name{}, parent{};
+    double x = 0.0, y = 0.0, z = 0.0;
+    if (std::sscanf(line.c_str(), "| %d | `%31[a-z_0-9]` | %31[^|] | %lf, %lf, %lf |", &joint, name.data(),
+                    parent.data(), &x, &y, &z) != 6)
+      continue;
+    ASSERT_EQ(joint, found++) << line;
+    EXPECT_EQ(kSmplNames[joint], name.data());
+    const std::string expected = joint == 0 ? "- " : "`" + std::string(kSmplNames[kSmplParents[joint]]) + "` ";
+    EXPECT_EQ(expected, parent.data());
+    EXPECT_LT((positions[joint] - Eigen::Vector3d(x, y, z)).cwiseAbs().maxCoeff(), kRounded) << line;
+  }
+  EXPECT_EQ(found, kSmplJoints);
+}
+
+constexpr int kFrames = 9, kWristLeft = 6;
+constexpr double kRate = 60.0;
+
+RawPeople two_people() {
+  const JointLayout& layout = joint_layout("kinect-25");
+  RawPeople people{.id = "clip", .name = "clip.npz", .layout = &layout, .joints = {}};
+  for (PointTracks& joints : people.joints) {
+    joints = PointTracks(kFrames, static_cast<int>(layout.names.size()));
+    for (int t = 0; t < kFrames; ++t) joints.frame(t).setOnes();
+  }
+  return people;
+}
+
+TEST(JointGaps, AreFilledAlongAStraightLine) {
+  for (const int who : {0, 1}) {
+    RawPeople people = two_people();
+    PointTracks& joints = people.joints[who];
+    joints.at(2, kWristLeft) = Eigen::Vector3d(1.0, 0.0, -3.0);
+    for (const int t : {3, 4, 5}) joints.at(t, kWristLeft).setConstant(std::nan(""));
+    joints.at(6, kWristLeft) = Eigen::Vector3d(5.0, 8.0, -3.0);
+    std::optional<RawPeople> filled;
+    EXPECT_NE(fill_gaps(people, kRate, filled), "");
+    ASSERT_TRUE(filled);
+    for (const int t : {3, 4, 5}) {
+      const Eigen::Vector3d expected(1.0 + (t - 2), 2.0 * (t - 2), -3.0);
+      EXPECT_LT((filled->joints[who].at(t, kWristLeft) - expected).norm(), 1e-15) << "frame " << t;
+    }
+    EXPECT_EQ(filled->joints[who].at(6, kWristLeft), joints.at(6, kWristLeft));
+    EXPECT_EQ(filled->joints[1 - who].data(), people.joints[1 - who].data());
+  }
+}
+
+TEST(JointGaps, WherePeopleAreSeenThroughoutNothingIsCopied) {
+  std::optional<RawPeople> filled;
+  EXPECT_EQ(fill_gaps(two_people(), kRate, filled), "");
+  EXPECT_FALSE(filled);
 }
 
 }  // namespace

@@ -3,13 +3,16 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/people/formats/inter/inter_x.h"
+#include "duet/people/video_person.h"
 #include "tests/motion/people_files.h"
+#include "tests/people/body_files.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -194,6 +197,149 @@ TEST(PeopleFormat, WhatIsOfNoFormatIsRefusedWithWhatItIs) {
               }),
               "(nothing was thrown)")
         << format.name;
+}
+
+constexpr int kFrames = 40;
+
+RawPeople two_people() {
+  return test::standin_people(test::standin_clip(kFrames, 30.0), joint_layout("ntu-25"), test::y_up());
+}
+
+std::string body(const RawPeople& people, std::size_t who, int t, const std::string& id,
+                 const std::string& state = "2") {
+  std::string text = id + " 0 1 1 1 1 0 0.02 -0.1 2\n25\n";
+  for (int j = 0; j < 25; ++j) {
+    const Eigen::Vector3d p = people.joints[who].at(t, j);
+    text += fmt::format("{:.7f} {:.7f} {:.7f} 279.9 186.2 990.5 498.1 -0.2 -0.03 0.9 -0.1 {}\n", p.x(), p.y(), p.z(),
+                        state);
+  }
+  return text;
+}
+
+// Person B comes in frame 3; a chair is taken for a third in frames 5 to 9.
+std::string skeleton_text(const RawPeople& people) {
+  std::string text = fmt::format("{}\n", kFrames);
+  for (int t = 0; t < kFrames; ++t) {
+    const bool third = t >= 5 && t < 10;
+    text += fmt::format("{}\n", 1 + (t >= 3 ? 1 : 0) + (third ? 1 : 0));
+    text += body(people, 0, t, "72057594037931101", t == 20 ? "0" : "2");
+    if (third) text += body(people, 0, 0, "72057594037931200");
+    if (t >= 3) text += body(people, 1, t, "72057594037931368");
+  }
+  return text;
+}
+
+SourceClip read(const std::string& folder) {
+  const std::vector<std::string> paths = {folder};
+  const PeopleFormat& format = find_people_format(paths);
+  EXPECT_EQ(format.name, "ntu");
+  return read_source_clip(format, format.find(paths, {}).at(0), {.output_rate_hz = 30.0});
+}
+
+TEST(Ntu, TheTwoBodiesThatAreSeenLongestAreRead) {
+  const ScratchFolder folder;
+  const RawPeople people = two_people();
+  write_file(folder / "S001C003P008R002A058.skeleton", skeleton_text(people));
+  const SourceClip found = read(folder / "");
+  EXPECT_EQ(found.clip.id, "S001C003P008R002A058");
+  EXPECT_EQ(found.clip.task, Task::kHandshake);
+  EXPECT_EQ(found.clip.source.at("label"), "shaking hands");
+  EXPECT_EQ(found.clip.frames(), kFrames - 3);
+  EXPECT_SENTENCE(found.evidence);
+  const InteractionClip known = test::standin_clip(kFrames, 30.0);
+  for (const SmplJoint joint : {kLeftHip, kRightKnee, kLeftShoulder, kRightElbow}) {
+    const auto apart = [&](const InteractionClip& clip, int t) {
+      return (clip.a.joints.at(t, joint) - clip.b.joints.at(t, kLeftHip)).norm();
+    };
+    for (int t = 0; t < found.clip.frames(); t += 5) EXPECT_NEAR(apart(found.clip, t), apart(known, t + 3), 1e-5) << t;
+  }
+}
+
+TEST(Ntu, BadFilesAreRefusedByLine) {
+  const ScratchFolder folder;
+  const std::string good = skeleton_text(two_people());
+  const auto refusal = [&](const std::string& text) {
+    write_file(folder / "x.skeleton", text);
+    const std::vector<std::string> paths = {folder / "x.skeleton"};
+    const PeopleFormat& format = find_people_format(paths);
+    PeopleOptions options;
+    options.task = Task::kHug;
+    return thrown_message<InputError>([&] { (void)read_source_clip(format, format.find(paths, {}).at(0), options); });
+  };
+  for (const char* text : {"many\n", "1\n", "1\n1\n7 0 1\n", "1\n1\n7 0 1 1 1 1 0 0 0 2\n20\n"})
+    EXPECT_SENTENCE(refusal(text));
+  EXPECT_SENTENCE(refusal(good.substr(0, good.size() / 2)));
+  EXPECT_SENTENCE(refusal("1\n1\n" + body(two_people(), 0, 0, "7")));
+  const std::string twice = body(two_people(), 0, 0, "7");
+  EXPECT_SENTENCE(refusal("1\n2\n" + twice + twice));
+  const std::string other = body(two_people(), 1, 0, "8");
+  EXPECT_SENTENCE(refusal("2\n1\n" + twice + "1\n" + other));
+}
+
+// One person of an estimator's file, as the camera has them.
+
+// In single precision, and through a rotation matrix.
+constexpr double kSingle = 2e-6;
+
+std::string write(const ScratchFolder& folder, const std::string& name, const std::string& bytes) {
+  write_file(folder / name, bytes);
+  return folder / name;
+}
+
+TEST(VideoPerson, OfPhalpIsTheOneWhoIsSeenForLongest) {
+  const ScratchFolder folder;
+  const test::BodyParameters brief = test::body_parameters(4, 0.3, 23, {0.0, 0.0, 1.0});
+  const test::BodyParameters longer = test::body_parameters(6, 1.2, 23, {0.5, 0.1, 40.0});
+  const std::string path = write(folder, "video.pkl", test::phalp_pkl({{7, 0, brief}, {3, 2, longer}}, 9));
+  ASSERT_TRUE(is_video_person(path));
+  const VideoPerson person = read_video_person(path, {.depth_scale = 0.05});
+  EXPECT_EQ(person.format, "4d-humans");
+  EXPECT_EQ(person.rate_hz, 30.0);
+  ASSERT_EQ(person.joints.frames(), 9);
+  EXPECT_EQ(person.seen, (std::vector<bool>{false, false, true, true, true, true, true, true, false}));
+  const test::PosedBody expected = test::posed(longer, rest_joints(average_body(), longer.betas));
+  for (int t = 0; t < 6; ++t) {
+    const Eigen::Vector3d nearer(0.0, 0.0, (0.05 - 1.0) * longer.translation[static_cast<std::size_t>(3 * t + 2)]);
+    for (int j = 0; j < kSmplJoints; ++j)
+      EXPECT_LE((person.joints.at(t + 2, j) - (expected.joints[static_cast<std::size_t>(t)].col(j) + nearer)).norm(),
+                10 * kSingle)
+          << t << " " << j;
+  }
+}
+
+TEST(VideoPerson, OfTwoWhoAreSeenAsLongIsTheNearer) {
+  const ScratchFolder folder;
+  const test::BodyParameters far = test::body_parameters(3, 0.3, 23, {0.0, 0.0, 5.0});
+  const test::BodyParameters near = test::body_parameters(3, 1.2, 23, {0.0, 0.0, 2.0});
+  const VideoPerson person =
+      read_video_person(write(folder, "v.pkl", test::phalp_pkl({{1, 0, far}, {2, 0, near}}, 3)), {.rate_hz = 25.0});
+  EXPECT_NEAR(person.joints.at(0, kPelvis).z(), 2.0, 0.06);
+  EXPECT_EQ(person.rate_hz, 25.0);
+}
+
+TEST(VideoPerson, OfGvhmrIsInTheCamerasFrame) {
+  const ScratchFolder folder;
+  const test::BodyParameters body = test::body_parameters(4, 0.3, 21, {0.2, 0.1, 2.5});
+  const std::string path = write(folder, "hmr4d_results.pt", test::gvhmr_pt(body, "smpl_params_incam"));
+  const VideoPerson person = read_video_person(path);
+  EXPECT_EQ(person.format, "gvhmr");
+  ASSERT_EQ(person.joints.frames(), 4);
+  for (int t = 0; t < 4; ++t)
+    for (int i = 0; i < 3; ++i)
+      EXPECT_NEAR(person.joints.at(t, kPelvis)[i], body.translation[static_cast<std::size_t>(3 * t + i)], kSingle);
+}
+
+TEST(VideoPerson, NamesWhatIsWrong) {
+  const ScratchFolder folder;
+  const auto refusal = [&](const std::string& name, const std::string& bytes) {
+    return test::thrown_message<InputError>([&] { (void)read_video_person(write(folder, name, bytes)); });
+  };
+  const test::BodyParameters body = test::body_parameters(3, 0.3);
+  EXPECT_SENTENCE(refusal("world.pt", test::gvhmr_pt(body)));
+  EXPECT_SENTENCE(test::thrown_message<InputError>(
+      [&] { (void)read_phalp_person(write(folder, "nobody.pkl", test::phalp_pkl({}, 2)), {}); }));
+  EXPECT_SENTENCE(refusal("text.txt", "text"));
+  EXPECT_FALSE(is_video_person(folder / "text.txt"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "duet/robots/card.h"
 
+#include "duet/robots/robot_cards.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {
@@ -7,7 +8,9 @@ namespace {
 
 using test::kSmallCard;
 using test::kSmallUrdf;
+using test::load_small;
 using test::replaced;
+using test::thrown_message;
 
 // The error of parsing the small card after `from` became `to`; the file is called c.yaml.
 std::string card_error(const std::string& from, const std::string& to) {
@@ -220,6 +223,163 @@ TEST(Card, LockedSlideIsAnOffset) {
       model.frames[model.frame_index("brick")].X_LF.inverse() * model.frames[model.frame_index("lower")].X_LF;
   EXPECT_LT((X_brick_lower.p - Eigen::Vector3d(0.1 / std::sqrt(2.0), 0.1 / std::sqrt(2.0), -0.1)).norm(), 1e-15);
 }
+
+// Digests of URDF and card, byte by byte, as they were when rows were published under them.
+constexpr std::pair<const char*, const char*> kPublishedDigests[] = {
+    {"g1", "b22cde7449b8de81c5bb67eb826ea8dddc87783671befcad2c40d80e1b44af7b"},
+    {"g1_12dof", "a973fe9e6231e92af5ed4d7f964a4ebea7c0eccbc5b491f2624da4d0902c20ab"},
+    {"g1_27dof", "af0aa4f47abb05dd0c61ca8a1146d8bca28e240a727e66c5b05f13df780b2845"},
+    {"g1_playground", "57bdbfda72094abe6364700628b71638ea92df71d477ba71c6f24046917ca788"},
+    {"g1_twist2", "f5a01d41e2755e19a38604e36e60ff9cbb6dfc7d88870508ad1dde14828c264f"}};
+
+TEST(RobotDigest, OfPublishedCardsIsThePublishedOne) {
+  for (const auto& [name, digest] : kPublishedDigests) {
+    EXPECT_EQ(load_robot(card_path(name)).digest, digest) << name;
+    const auto robot = robot_of_digest(digest);
+    ASSERT_NE(robot, nullptr);
+    EXPECT_EQ(robot->name, name);
+  }
+}
+
+TEST(RobotDigest, IsOfWhatACardSaysAndNotOfHowItIsWritten) {
+  const std::string digest = load_small().digest;
+  EXPECT_EQ(digest.size(), 64u);
+  EXPECT_EQ(load_small(kSmallCard + "# a comment\n").digest, digest);
+  EXPECT_EQ(load_small(replaced(kSmallCard, "kp: 20,", "kp: 2.0e1,")).digest, digest);
+  EXPECT_EQ(load_small(replaced(kSmallCard, "armature: 0.01, kp: 20,", "kp: 20, armature: 0.01,")).digest, digest);
+  EXPECT_EQ(load_small(replaced(kSmallCard, "name: small\nurdf: small.urdf", "urdf: small.urdf\nname: small")).digest,
+            digest);
+  const std::string spread = replaced(kSmallCard, "tracks: {rhand: tip}\n", "");
+  const test::ScratchFolder folder;
+  write_file(folder / "base.yaml", replaced(spread, "kp: 20", "kp: 21"));
+  write_file(folder / "small.urdf", test::kSmallUrdf);
+  write_file(folder / "small.yaml", R"(name: small
+extends: base.yaml
+tracks: {rhand: tip}
+joints:
+  - {name: shoulder, armature: 0.01, kp: 20, kd: 1, neutral: 0.5}
+  - {name: elbow, armature: 0.02, kp: 10, kd: 0.5}
+)");
+  EXPECT_EQ(load_robot(folder / "small.yaml").digest, digest);
+}
+
+TEST(RobotDigest, TellsWhatCardsSayApart) {
+  const std::string digest = load_small().digest;
+  for (const auto& [from, to] : std::initializer_list<std::pair<std::string, std::string>>{
+           {"kp: 20,", "kp: 21,"},
+           {"name: small", "name: other"},
+           {"radius: 0.02, region: arm", "radius: 0.02, region: forearm"},
+           {"tracks: {rhand: tip}", "tracks: {lhand: tip}"},
+           {"tracks: {rhand: tip}", "tracks: {rhand: tip}\nfall: {height: 0.1, cos_tilt: 0.5}"}})
+    EXPECT_NE(load_small(replaced(kSmallCard, from, to)).digest, digest) << to;
+  EXPECT_NE(load_small(kSmallCard, test::kSmallUrdf + "\n").digest, digest);
+}
+
+TEST(RobotDigest, ListsAndMappingsOfTheSameWordsAreOthers) {
+  const auto content = [](const char* text) { return content_of(YAML::Load(text)).at("x"); };
+  EXPECT_NE(content("x: [a, b]"), content("x: [ab]"));
+  EXPECT_NE(content("x: [[a], b]"), content("x: [a, [b]]"));
+  EXPECT_NE(content("x: {a: b}"), content("x: [a, b]"));
+  EXPECT_NE(content("x: {a: 1}"), content("x: {a: -1}"));
+  EXPECT_EQ(content("x: {a: 1, b: 2}"), content("x: {b: 2.0, a: 1}"));
+}
+
+// Cards that extend others.
+
+// Folders of cards: the small robot in base/, and what a test adds.
+class CardExtends : public ::testing::Test {
+ protected:
+  CardExtends() {
+    write_file(folder_ / "base/small.yaml", kSmallCard);
+    write_file(folder_ / "base/small.urdf", test::kSmallUrdf);
+  }
+  std::string add(const std::string& file, const std::string& text) {
+    write_file(folder_ / file, text);
+    return folder_ / file;
+  }
+  std::string error(const std::string& card) {
+    return thrown_message<InputError>([&] { load_robot(card); });
+  }
+
+  test::ScratchFolder folder_;
+};
+
+TEST_F(CardExtends, OnlyTheKeysGivenReplaceTheOnesExtended) {
+  const std::string card = add("base/stiff.yaml", R"(name: stiff
+extends: small.yaml
+joints:
+  - {name: shoulder, armature: 0.5, kp: 70, kd: 7}
+  - {name: elbow, armature: 0.5, kp: 80, kd: 8}
+)");
+  const RobotModel stiff = load_robot(card), small = load_robot(folder_ / "base/small.yaml");
+  EXPECT_EQ(stiff.name, "stiff");
+  EXPECT_EQ(stiff.joints[0].kp, 70.0);
+  EXPECT_EQ(stiff.neutral, Eigen::Vector2d::Zero());
+  EXPECT_EQ(stiff.total_mass(), small.total_mass());
+  EXPECT_EQ(stiff.shapes.size(), small.shapes.size());
+  EXPECT_EQ(stiff.keypoints.size(), small.keypoints.size());
+  EXPECT_NE(stiff.digest, small.digest);
+}
+
+TEST_F(CardExtends, TheUrdfOfAnotherFolderIsFound) {
+  const std::string card = add("other/deep/far.yaml", "name: far\nextends: ../../base/small.yaml\n");
+  EXPECT_EQ(parse_card(read_text(card), card).urdf, "../../base/small.urdf");
+  EXPECT_EQ(load_robot(card).dof(), 2);
+  EXPECT_EQ(
+      parse_card(read_text(card), card).files,
+      (std::vector<std::string>{
+          card, (std::filesystem::path(card).parent_path() / "../../base/small.yaml").lexically_normal().string()}));
+}
+
+TEST_F(CardExtends, GoesOverSeveralCards) {
+  add("base/b.yaml", "name: b\nextends: small.yaml\ntracks: {head: tip}\n");
+  const std::string c = add("base/c.yaml", "name: c\nextends: b.yaml\npairs: []\n");
+  const RobotModel model = load_robot(c);
+  EXPECT_EQ(model.name, "c");
+  EXPECT_EQ(model.tracks.count("head"), 1u);
+  EXPECT_EQ(model.tracks.count("rhand"), 0u);
+  EXPECT_TRUE(model.pairs.empty());
+}
+
+TEST_F(CardExtends, AFaultOfTheCardExtendedNamesItsFileAndLine) {
+  add("base/broken.yaml", replaced(kSmallCard, "kp: 20", "kp: stiff"));
+  EXPECT_EQ(error(add("base/mine.yaml", "name: mine\nextends: broken.yaml\n")),
+            folder_ / "base/broken.yaml" +
+                ":5: joint 'shoulder': key 'kp': expected a finite number, zero or more, found 'stiff'");
+  // A fault that the card itself makes in what it extends is told at the place of the latter.
+  EXPECT_SENTENCE(error(add("base/less.yaml", R"(name: less
+extends: small.yaml
+locked: [{name: elbow, position: 0}]
+)")));
+}
+
+TEST_F(CardExtends, ACycleNamesBothFiles) {
+  add("base/a.yaml", "name: a\nextends: b.yaml\n");
+  add("base/b.yaml", "name: b\nextends: a.yaml\n");
+  EXPECT_EQ(error(folder_ / "base/a.yaml"),
+            folder_ / "base/b.yaml" + ":2: robot card: key 'extends': expected cards without a cycle, found " +
+                (folder_ / "base/a.yaml") + ", which extends " + (folder_ / "base/b.yaml"));
+  EXPECT_SENTENCE(error(add("base/self.yaml", "name: self\nextends: self.yaml\n")));
+}
+
+TEST_F(CardExtends, ARowIsEightCardsLongAtMost) {
+  std::string last = "small.yaml";
+  for (int i = 1; i <= kMostExtended; ++i) {
+    const std::string name = fmt::format("c{}", i);
+    add("base/" + name + ".yaml", fmt::format("name: {}\nextends: {}\n", name, last));
+    last = name + ".yaml";
+  }
+  EXPECT_EQ(load_robot(folder_ / ("base/" + last)).dof(), 2);
+  EXPECT_SENTENCE(error(add("base/more.yaml", "name: more\nextends: " + last + "\n")));
+}
+
+TEST_F(CardExtends, IsARelativePathOfACard) {
+  for (const char* path : {"/etc/hosts.yaml", "small.txt", "g1"})
+    EXPECT_SENTENCE(error(add("base/mine.yaml", fmt::format("name: mine\nextends: {}\n", path))));
+  EXPECT_SENTENCE(error(add("base/mine.yaml", "name: mine\nextends: none.yaml\n")));
+}
+
+TEST_F(CardExtends, ACardHasItsOwnName) { EXPECT_SENTENCE(error(add("base/mine.yaml", "extends: small.yaml\n"))); }
 
 }  // namespace
 }  // namespace duet

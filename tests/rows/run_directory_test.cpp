@@ -1,13 +1,17 @@
 #include "duet/rows/folder/run_directory.h"
 
 #include <gmock/gmock.h>
+#include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 
+#include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/rows/folder/environment.h"
+#include "duet/rows/folder/run_files.h"
 #include "tests/deep_json.h"
 #include "tests/file_size_limit.h"
 #include "tests/rows/rows.h"
@@ -22,8 +26,8 @@ using test::FileSizeLimit;
 using test::ScratchFolder;
 using test::thrown_message;
 using test::tiny_run;
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 TEST(RunDirectory, KeepsWhatWasAppended) {
   const ScratchFolder scratch;
@@ -364,6 +368,21 @@ TEST(Environment, DescribesTheMachineInOneLine) {
   const std::string line = describe_machine();
   EXPECT_THAT(line, AllOf(HasSubstr(" core"), HasSubstr(", ")));
   EXPECT_EQ(line.find('\n'), std::string::npos);
+}
+
+TEST(RunLitter, OnlyWhatADeadProcessLeftHalfWrittenGoes) {
+  const test::ScratchFolder folder;
+  std::filesystem::create_directories(folder / "trajectories");
+  const std::string dead = "run.json.part-999999999-0", mine = "run.json.part-" + std::to_string(getpid()) + "-0";
+  for (const std::string& name : {dead, mine, std::string("run.json.part-"), std::string("run.json.part-me"),
+                                  std::string("run.json"), "trajectories/" + dead})
+    write_file(folder / name, "x");
+  remove_litter(folder / "");
+  EXPECT_FALSE(std::filesystem::exists(folder / dead));
+  EXPECT_FALSE(std::filesystem::exists(folder / ("trajectories/" + dead)));
+  for (const std::string& name :
+       {mine, std::string("run.json.part-"), std::string("run.json.part-me"), std::string("run.json")})
+    EXPECT_TRUE(std::filesystem::exists(folder / name)) << name;
 }
 
 }  // namespace

@@ -3,9 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "duet/core/require.h"
+#include "duet/training/agent.h"
 #include "duet/training/distill.h"
 #include "tests/training/fixtures.h"
 
@@ -131,6 +133,172 @@ TEST_F(DistillationInMujoco, TheLossFallsAndTheSeedDecides) {
     last = loss;
   }
   EXPECT_LT(last, 0.7 * first);
+}
+
+constexpr float kClip = 0.2F;
+constexpr double kStep = 1e-2;        // of a central difference in single precision
+constexpr double kDifference = 2e-3;  // what its rounding leaves
+
+double log_probability_of(float action, float mean, double log_std) {
+  const Eigen::VectorXf inverse_std = Eigen::VectorXf::Constant(1, static_cast<float>(std::exp(-log_std)));
+  return log_probability(inverse_std, static_cast<float>(log_std), &action, &mean);
+}
+
+TEST(LogProbability, IsThatOfTheNormalDistributionButForTheConstant) {
+  const Eigen::Vector3f std(0.5F, 1.0F, 2.0F), action(0.1F, -0.4F, 3.0F), mean(0.3F, 0.0F, 1.0F);
+  double expected = 0.0;
+  for (int k = 0; k < 3; ++k)
+    expected += -0.5 * std::pow((action[k] - mean[k]) / std[k], 2) - std::log(static_cast<double>(std[k]));
+  EXPECT_NEAR(log_probability(std.cwiseInverse(), std.array().log().sum(), action.data(), mean.data()), expected, 1e-5);
+}
+
+TEST(LikelihoodGradient, IsTheDerivativeByMeanAndLogStd) {
+  for (const float mean : {-1.2F, -0.1F, 0.0F, 0.7F})
+    for (const double log_std : {-0.7, 0.0, 0.4}) {
+      const float action = 0.3F, inverse_std = static_cast<float>(std::exp(-log_std));
+      const LikelihoodGradient by = likelihood_gradient(action, mean, inverse_std);
+      const auto h = static_cast<float>(kStep);
+      EXPECT_NEAR(
+          by.z * inverse_std,
+          (log_probability_of(action, mean + h, log_std) - log_probability_of(action, mean - h, log_std)) / (2 * h),
+          kDifference * (1.0 + std::abs(by.z)));
+      EXPECT_NEAR(
+          by.log_std,
+          (log_probability_of(action, mean, log_std + h) - log_probability_of(action, mean, log_std - h)) / (2 * h),
+          kDifference * (1.0 + by.z * by.z));
+    }
+}
+
+TEST(LikelihoodGradient, GrowsNoMoreBeyondFourStandardDeviations) {
+  EXPECT_FLOAT_EQ(likelihood_gradient(9.0F, 0.0F, 1.0F).z, 4.0F);
+  EXPECT_FLOAT_EQ(likelihood_gradient(-9.0F, 0.0F, 1.0F).z, -4.0F);
+  EXPECT_FLOAT_EQ(likelihood_gradient(-9.0F, 0.0F, 1.0F).log_std, 15.0F);
+}
+
+// The loss of one sample as it is printed.
+double loss(double log_ratio, double advantage) {
+  const double ratio = std::exp(log_ratio);
+  return -std::min(ratio * advantage, std::clamp(ratio, 1.0 - kClip, 1.0 + kClip) * advantage);
+}
+
+TEST(RatioGradient, IsTheDerivativeOfTheClippedObjective) {
+  for (const double advantage : {-1.5, -0.2, 0.3, 2.0})
+    for (const double log_ratio : {-0.5, -0.1, 0.0, 0.1, 0.5})
+      EXPECT_NEAR(ratio_gradient(static_cast<float>(log_ratio), static_cast<float>(advantage), kClip),
+                  (loss(log_ratio + 1e-6, advantage) - loss(log_ratio - 1e-6, advantage)) / 2e-6, 1e-5)
+          << log_ratio << " " << advantage;
+}
+
+TEST(RatioGradient, IsNotClippedOnTheEdgeAndStaysFinite) {
+  EXPECT_FLOAT_EQ(ratio_gradient(0.0F, 1.0F, 0.0F), -1.0F);
+  EXPECT_FLOAT_EQ(ratio_gradient(0.0F, -1.0F, 0.0F), 1.0F);
+  EXPECT_TRUE(std::isfinite(ratio_gradient(1000.0F, -1.0F, kClip)));
+}
+
+TEST(GeneralisedAdvantages, AreTheDiscountedSumOfWhatWasNotForeseen) {
+  const std::vector<StepWorth> steps = {{.reward = 1.0F, .value = 2.0F}, {.reward = -0.5F, .value = 1.0F}};
+  const double discount = 0.9, lambda = 0.8, last = 3.0;
+  const double second = -0.5 + discount * last - 1.0, first = 1.0 + discount * 1.0 - 2.0;
+  const std::vector<float> worth = generalised_advantages(steps, static_cast<float>(last), discount, lambda);
+  ASSERT_EQ(worth.size(), 2U);
+  EXPECT_NEAR(worth[1], second, 1e-6);
+  EXPECT_NEAR(worth[0], first + discount * lambda * second, 1e-6);
+}
+
+TEST(GeneralisedAdvantages, NothingComesBackOverTheEndOfAnEpisode) {
+  const std::vector<StepWorth> steps = {{.reward = 1.0F, .value = 2.0F, .ends = true},
+                                        {.reward = 100.0F, .value = 50.0F}};
+  EXPECT_FLOAT_EQ(generalised_advantages(steps, 7.0F, 0.9, 0.8)[0], -1.0F);
+}
+
+Eigen::MatrixXf random_matrix(int rows, int cols, std::uint64_t stream) {
+  Random random(9, stream);
+  Eigen::MatrixXf matrix(rows, cols);
+  for (Eigen::Index i = 0; i < matrix.size(); ++i) matrix.data()[i] = static_cast<float>(random.normal());
+  return matrix;
+}
+
+TEST(BatchMlp, ForwardIsThatOfTheRunnerForEachColumn) {
+  Random random(1, 1);
+  const Mlp mlp = random_mlp({6, 10, 4, 3}, 1.0F, random);
+  const Eigen::MatrixXf x = random_matrix(6, 17, 2);
+  BatchMlp batch(mlp);
+  MlpRunner runner(mlp);
+  const Eigen::MatrixXf y = batch.forward(x);
+  for (int c = 0; c < x.cols(); ++c) {
+    const std::span<const float> expected = runner.run({x.col(c).data(), 6});
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(y(k, c), expected[k], 1e-5);
+  }
+}
+
+// The loss is a weighted sum of outputs; its derivative by each weight is compared with a central difference.
+TEST(BatchMlp, GradientIsTheFiniteDifference) {
+  Random random(1, 1);
+  Mlp mlp = random_mlp({5, 8, 6, 2}, 1.0F, random);
+  const Eigen::MatrixXf x = random_matrix(5, 11, 3), weight = random_matrix(2, 11, 4);
+  BatchMlp batch(mlp);
+  batch.forward(x);
+  batch.backward(weight);
+  MlpGradient gradient = batch.gradient();
+  const auto loss = [&] {
+    BatchMlp fresh(mlp);
+    return fresh.forward(x).cwiseProduct(weight).cast<double>().sum();
+  };
+  auto parameters = flat_views(mlp.layers);
+  auto gradients = flat_views(gradient);
+  constexpr float h = 1e-2F;  // float forward passes: differences of 1e-6 / h, curvature of h^2
+  for (size_t block = 0; block < parameters.size(); ++block)
+    for (Eigen::Index i = 0; i < parameters[block].size(); i += 7) {
+      const float kept = parameters[block][i];
+      parameters[block][i] = kept + h;
+      const double above = loss();
+      parameters[block][i] = kept - h;
+      const double below = loss();
+      parameters[block][i] = kept;
+      EXPECT_NEAR(gradients[block][i], (above - below) / (2.0 * h), 3e-2) << block << " " << i;
+    }
+}
+
+TEST(Adam, FindsTheLeastOfAParabola) {
+  Eigen::VectorXf p = Eigen::VectorXf::Constant(3, 4.0F), g(3);
+  std::vector<Eigen::Map<Eigen::VectorXf>> parameters, gradients;
+  parameters.emplace_back(p.data(), 3);
+  gradients.emplace_back(g.data(), 3);
+  Adam adam;
+  for (int i = 0; i < 2000; ++i) {
+    g = 2.0F * (p - Eigen::Vector3f(1.0F, -2.0F, 0.5F));
+    adam.step(parameters, gradients, 0.02, 1e9);
+  }
+  EXPECT_LT((p - Eigen::Vector3f(1.0F, -2.0F, 0.5F)).norm(), 1e-2F);
+}
+
+TEST(Normaliser, BatchesGiveTheMomentsOfAllSamples) {
+  const Eigen::MatrixXf all = 3.0F * random_matrix(4, 600, 5).array() + 2.0F;
+  Normaliser normaliser(4);
+  normaliser.count = 0.0;
+  for (int b = 0; b < 6; ++b) normaliser.update(all.middleCols(100 * b, 100));
+  const Eigen::VectorXf mean = all.rowwise().mean();
+  EXPECT_LT((normaliser.mean - mean).norm(), 1e-4F);
+  EXPECT_LT((normaliser.variance - (all.colwise() - mean).array().square().rowwise().mean().matrix()).norm(), 1e-3F);
+}
+
+TEST(Normaliser, ClipsWhatIsFarOff) {
+  Normaliser normaliser(1);
+  Eigen::MatrixXf x(1, 2);
+  x << 1e6F, -1e6F;
+  normaliser.apply(x);
+  EXPECT_EQ(x(0, 0), 5.0F);
+  EXPECT_EQ(x(0, 1), -5.0F);
+}
+
+TEST(Normaliser, TakesTheMeanOffAndDividesByTheDeviation) {
+  Normaliser normaliser(2);
+  normaliser.mean << 3.0F, -2.0F;
+  normaliser.set_deviation(Eigen::Vector2f(0.5F, 4.0F));
+  Eigen::MatrixXf x(2, 2);
+  x << 4.0F, 3.0F, 2.0F, -6.0F;
+  normaliser.apply(x);
+  EXPECT_LT((x - (Eigen::MatrixXf(2, 2) << 2.0F, 0.0F, 1.0F, -1.0F).finished()).norm(), 1e-5F);
 }
 
 }  // namespace
