@@ -6,11 +6,15 @@
 #include <filesystem>
 
 #include "duet/core/digest.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/execution/run_inputs.h"
+#include "duet/execution/runner.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/embodiments.h"
+#include "duet/experiment/suite/profile.h"
+#include "duet/report/ranking/golden.h"
 #include "tests/execution/verified_run.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
@@ -23,8 +27,8 @@ namespace fs = std::filesystem;
 using test::make_run;
 using test::objection;
 using test::replace_in;
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 // A suite with everything that a suite can name by its place.
 class KeptRun : public testing::Test {
@@ -260,6 +264,27 @@ TEST_F(KeptRun, AnIndexThatLeadsOutOfTheFolderIsRefused) {
   make_run(load_suite(scratch_ / "here/suite.yaml"), scratch_ / "run");
   replace_in(scratch_ / "run/inputs/inputs.json", "inputs/contact_limits.yaml", "../here/limits.yaml");
   EXPECT_SENTENCE(objection(scratch_ / "run"));
+}
+
+// The blessed figures of results/golden, made again by this build: `duet run results/golden/suite.yaml -o RUN` and
+// `duet bless RUN -o results/golden/baseline.json` where they change on purpose.
+
+TEST(GoldenRun, AgreesWithTheBlessedBaseline) {
+#ifdef DUET_SANITIZED
+  GTEST_SKIP() << "not run: blessed with GCC; contact amplifies the last bits of another compiler's sums";
+#endif
+  const std::string folder = std::string(DUET_SOURCE_DIR) + "/results/golden/";
+  const Suite suite = load_suite(folder + "suite.yaml");
+  for (const std::string& engine : suite.engines)
+    if (!can_run_in(engine)) GTEST_SKIP() << "not run: " << engine << " absent";
+  const test::ScratchFolder scratch;
+  Progress quiet(Progress::Style::kQuiet);
+  RunOptions options;
+  options.threads = 2;
+  EXPECT_EQ(run_suite(suite, scratch / "run", options, quiet).end, RunEnd::kComplete);
+  const duet::Run run = load_run(scratch / "run");
+  for (const GoldenDifference& difference : check(read_file(folder + "baseline.json"), leaderboard(run.rows), run.info))
+    ADD_FAILURE() << difference.where << ": expected " << difference.expected << ", found " << difference.found;
 }
 
 }  // namespace

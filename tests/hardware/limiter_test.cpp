@@ -1,4 +1,4 @@
-// One test for each clamp of the limiter with nobody near; those of a person are in limiter_person_test.cpp.
+// One test for each clamp of the limiter with nobody near; those of a person are in limiter_laws_test.cpp.
 #include "duet/hardware/safety/limiter.h"
 
 #include <cmath>

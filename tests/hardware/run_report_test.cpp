@@ -2,10 +2,19 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <vector>
 
 #include "duet/archives/mcap.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/hardware/log/guard_health.h"
+#include "tests/hardware/guarded_twin.h"
 #include "tests/hardware/logged_twin.h"
 #include "tests/support.h"
 
@@ -15,6 +24,7 @@ namespace {
 using test::GuardedTwin;
 using test::LoggedTwin;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 // Armed, started, and run for a second.
 void start(LoggedTwin& run) {
@@ -130,6 +140,173 @@ TEST(RunReport, ReadsALogOfBefore) {
   EXPECT_EQ(report.ticks, 12);
   EXPECT_FALSE(report.has_health);
   EXPECT_EQ(report.states, 12);
+}
+
+TEST(GuardHealth, HasAgesOfWhatCameAndNoneOfWhatDidNot) {
+  GuardedTwin robot;
+  robot.start();
+  robot.plans = false;
+  robot.run_for(0.2);
+  GuardHealth health;
+  fill_health(robot.guard, health);
+  EXPECT_EQ(health.state, SafetyState::kRun);
+  EXPECT_TRUE(health.stands);
+  EXPECT_EQ(health.state_age, 0.0);
+  EXPECT_NEAR(health.planner_age, 0.2, 0.02 + 1e-9);
+  EXPECT_TRUE(std::isnan(health.executor_age));
+  EXPECT_TRUE(std::isnan(health.charge));  // nobody reports it
+  EXPECT_EQ(health.states, robot.guard.status().states);
+}
+
+TEST(GuardHealth, AWindowKeepsTheOldestTheNearestAndTheHottest) {
+  GuardHealth window, first, second;
+  first.time = 1.0, first.state_age = 0.03, first.distance = 0.4, first.casing = 60.0, first.share = 0.2;
+  second.time = 2.0, second.state_age = 0.01, second.distance = 0.9, second.casing = 50.0, second.share = 1.0;
+  second.states = 7;
+  widen(first, window);
+  EXPECT_EQ(window.share, 0.2);
+  widen(second, window);
+  EXPECT_EQ(window.time, 2.0);
+  EXPECT_EQ(window.state_age, 0.03);
+  EXPECT_EQ(window.distance, 0.4);
+  EXPECT_EQ(window.casing, 60.0);
+  EXPECT_EQ(window.share, 0.2);
+  EXPECT_EQ(window.states, 7);
+  EXPECT_TRUE(std::isnan(window.person_age));
+}
+
+TEST(GuardHealth, IsReadAsItWasWritten) {
+  HealthMessage message;
+  message.health.state = SafetyState::kHold;
+  message.health.cause = StopCause::kPlannerAge;
+  message.health.stands = true;
+  message.health.planner_age = 0.7;
+  message.health.distance = 0.456;
+  message.health.restarts = 3;
+  message.health.network = {5, 0, 0, 0, 7};
+  message.missing = "remote_age";
+  message.tracking_joint = "left_elbow_joint";
+  message.next = std::string(next_key(SafetyState::kHold, true));
+  const HealthMessage again = parse_health(health_json(message).dump(), "status");
+  EXPECT_EQ(health_json(again), health_json(message));
+  EXPECT_TRUE(std::isnan(again.health.charge));
+  const std::string text = health_text(again);
+  EXPECT_THAT(text, HasSubstr("hold (planner_age), missing: remote_age"));
+  EXPECT_THAT(text, HasSubstr("next: A with R1: run again; select: damp"));
+  EXPECT_THAT(text, HasSubstr("planner 700 ms, person never"));
+  EXPECT_THAT(text, HasSubstr("charge not known"));
+  EXPECT_THAT(text, HasSubstr("person: 0.46 m away; "));
+  EXPECT_EQ(again.health.network, message.health.network);
+  EXPECT_THAT(text, HasSubstr("network: 5 taken, 7 refused: 7 forged (another key, or altered on its way)"));
+}
+
+TEST(GuardHealth, RefusesWhatIsNoHealth) {
+  const auto refusal = [](const std::string& text) {
+    return test::thrown_message<InputError>([&] { (void)parse_health(text, "status"); });
+  };
+  EXPECT_SENTENCE(refusal("{"));
+  EXPECT_SENTENCE(refusal("[]"));
+  nlohmann::json json = health_json({});
+  json["state"] = "asleep";
+  EXPECT_SENTENCE(refusal(json.dump()));
+  json = health_json({});
+  json["charge"] = "full";
+  EXPECT_SENTENCE(refusal(json.dump()));
+  json = health_json({});
+  json.erase("restarts");
+  EXPECT_SENTENCE(refusal(json.dump()));
+  json = health_json({});
+  for (const char* count : {"-1", "1e300", "18446744073709551615"}) {
+    json["restarts"] = nlohmann::json::parse(count);
+    EXPECT_SENTENCE(refusal(json.dump()));
+  }
+}
+
+// Each state has a key, or says what is waited for; what the guard does with them is tested by the guard's own tests.
+TEST(GuardHealth, EveryStateHasANextKey) {
+  for (int state = 0; state < kSafetyStates; ++state)
+    for (const bool stands : {false, true})
+      EXPECT_FALSE(next_key(static_cast<SafetyState>(state), stands).empty()) << state;
+  GuardedTwin robot;
+  robot.hold_key(RemoteKey::kR1);
+  robot.run_for(2.2);
+  EXPECT_EQ(robot.state(), SafetyState::kReady);
+  robot.guard.arm();
+  robot.tick();
+  EXPECT_THAT(std::string(next_key(robot.state(), false)), HasSubstr("start: stand up"));
+  robot.hold_key(RemoteKey::kStart);
+  robot.run_for(0.1);
+  robot.drop_key(RemoteKey::kStart);
+  robot.run_for(1.0);
+  ASSERT_TRUE(robot.guard.status().input.stands);
+  EXPECT_THAT(std::string(next_key(robot.state(), true)), HasSubstr("A with R1: run"));
+  robot.hold_key(RemoteKey::kA);
+  robot.run_for(0.1);
+  EXPECT_EQ(robot.state(), SafetyState::kRun);
+}
+
+// The log of a run as programs read it that nobody here wrote: Foxglove's packages for MCAP, CDR and message
+// definitions, in Node.js. `npm ci` in viewer/ installs them; without them the test is not run.
+
+constexpr const char* kViewer = DUET_SOURCE_DIR "/viewer";
+
+bool packages_are_there() {
+  for (const char* package : {"@mcap/core", "@foxglove/rosmsg", "@foxglove/rosmsg2-serialization", "fzstd"})
+    if (!std::filesystem::exists(std::filesystem::path(kViewer) / "node_modules" / package)) return false;
+  return std::system("command -v node >/dev/null 2>&1") == 0;
+}
+
+// Time [ns], 0 for a state and 1 for a command, 29 positions.
+using Row = std::array<double, 2 + kG1Motors>;
+
+template <typename Frame>
+Row row_of(double now, double kind, const Frame& frame) {
+  Row row{std::round(1e9 * now), kind};
+  for (int j = 0; j < kG1Motors; ++j) row[2 + j] = static_cast<double>(frame.motor[j].q);
+  return row;
+}
+
+// A run of 6 s with arms that move; what was read and sent.
+std::vector<Row> run_and_log(const std::string& path) {
+  std::vector<Row> rows;
+  test::LoggedTwin run(path, test::twin_guard(), {.place_noise = 0.001, .joint_noise = 1e-3});
+  const auto remember = [&] {
+    const GuardStatus& status = run.robot.guard.status();
+    rows.push_back(row_of(status.input.now, 0.0, status.state_frame));
+    if (status.sent) rows.push_back(row_of(status.input.now, 1.0, status.frame));
+  };
+  run.arm(remember);
+  run.robot.message.command.q.array() += 0.5;
+  run.run_for(4.0, remember);
+  EXPECT_EQ(run.log.dropped(), 0);
+  return rows;
+}
+
+TEST(ForeignReader, FindsThePositionsThatWereWrittenAndSeeks) {
+  if (!packages_are_there()) GTEST_SKIP() << "not run: npm packages absent (viewer/node_modules, by npm ci)";
+  const test::ScratchFolder folder;
+  const std::vector<Row> written = run_and_log(folder / "run.mcap");
+  const std::string command = std::string("cd ") + kViewer + " && node read_log.mjs " + (folder / "run.mcap") + " " +
+                              (folder / "q.bin") + " >" + (folder / "found.json") + " 2>" + (folder / "errors");
+  ASSERT_EQ(std::system(command.c_str()), 0) << read_file(folder / "errors");
+
+  const std::string bytes = read_file(folder / "q.bin");
+  ASSERT_EQ(bytes.size(), written.size() * sizeof(Row));
+  std::vector<Row> found(written.size());
+  std::memcpy(found.data(), bytes.data(), bytes.size());
+  EXPECT_EQ(found, written);  // to the bit
+  const nlohmann::json json = nlohmann::json::parse(read_file(folder / "found.json"));
+  EXPECT_EQ(json["topics"]["rt/lowstate"].get<std::size_t>() + json["topics"]["rt/lowcmd"].get<std::size_t>(),
+            written.size());
+  EXPECT_GE(json["chunks"].get<int>(), 3);
+  EXPECT_NEAR(json["seconds"].get<double>(), 6.3, 0.1);  // no message stands before the run's time
+  EXPECT_NEAR(json["late"].get<double>(), 0.1 * 6.3 * 500.0, 5.0);
+  EXPECT_LT(json["sought"].get<double>(), 0.6 * json["size"].get<double>());
+  EXPECT_LT(json["opened"].get<double>(), 0.1 * json["size"].get<double>());
+  EXPECT_EQ(json["health"]["state"], "run");
+  const std::string elbow = test::g1()->joints[test::g1()->roles.arms[0][3]].name;
+  EXPECT_NEAR(json["limiter"]["joints"][elbow]["asked"].get<double>(),
+              test::g1()->neutral[test::g1()->roles.arms[0][3]] + 0.5, 1e-3);
 }
 
 }  // namespace
