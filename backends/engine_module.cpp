@@ -12,6 +12,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -115,7 +116,7 @@ std::vector<std::string> engine_names() {
 
 void check_name(const std::string& engine) {
   const std::vector<std::string> names = engine_names();
-  require(std::find(names.begin(), names.end(), engine) != names.end(), unknown_name_message("engine", engine, names));
+  require_known("engine", engine, names);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "duet/controllers/observer.h"
 #include "duet/controllers/root_conversion.h"
 #include "duet/core/field.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/robot_state.h"
@@ -108,14 +109,6 @@ Descriptor with_yaw_scale(Descriptor descriptor, const std::optional<double>& sc
   for (ChannelGroup& group : descriptor.observation.groups)
     for (Channel& channel : group.channels) set_yaw_scale(channel, *scale);
   return descriptor;
-}
-
-template <typename Joint>
-std::vector<std::string> names_of(const std::vector<Joint>& joints) {
-  std::vector<std::string> names;
-  names.reserve(joints.size());
-  for (const Joint& joint : joints) names.push_back(joint.name);
-  return names;
 }
 
 // One of the robot's joints as the descriptor has it.

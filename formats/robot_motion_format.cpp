@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "duet/core/file_batch.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/formats/format_row.h"
 #include "duet/robots/robot_model.h"
@@ -52,16 +52,10 @@ std::span<const RobotMotionFormat> robot_motion_formats() {
   return formats;
 }
 
-std::vector<std::string> robot_motion_format_names() {
-  std::vector<std::string> names;
-  for (const RobotMotionFormat& format : robot_motion_formats()) names.emplace_back(format.name);
-  return names;
-}
+std::vector<std::string> robot_motion_format_names() { return names_of(robot_motion_formats()); }
 
 const RobotMotionFormat& robot_motion_format(std::string_view name) {
-  for (const RobotMotionFormat& format : robot_motion_formats())
-    if (format.name == name) return format;
-  throw std::invalid_argument(unknown_name_message("robot motion format", name, robot_motion_format_names()));
+  return entry_named(robot_motion_formats(), "robot motion format", name);
 }
 
 namespace {

@@ -5,17 +5,14 @@
 
 #include <algorithm>
 
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 
 namespace duet {
 namespace {
 
-std::vector<std::string> port_names(std::span<const Port> ports) {
-  std::vector<std::string> names;
-  for (const Port& port : ports) names.push_back(port.name);
-  return names;
-}
+std::vector<std::string> port_names(std::span<const Port> ports) { return names_of(ports); }
 
 // Index of the port that a descriptor means; "" is the only one.
 int find_port(std::span<const Port> ports, const std::string& name, const char* what, const std::string& place) {

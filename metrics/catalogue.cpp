@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/metrics/retargeting.h"
@@ -122,14 +123,7 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
 
 std::span<const MetricInfo> metric_catalogue() { return kCatalogue; }
 
-const MetricInfo& metric_info(std::string_view name) {
-  for (const MetricInfo& info : kCatalogue)
-    if (info.name == name) return info;
-  std::vector<std::string> names;
-  names.reserve(kCatalogue.size());
-  for (const MetricInfo& info : kCatalogue) names.emplace_back(info.name);
-  throw std::invalid_argument(unknown_name_message("metric", name, names));
-}
+const MetricInfo& metric_info(std::string_view name) { return entry_named(kCatalogue, "metric", name); }
 
 const MetricInfo& metric_of_reading(std::string_view name) {
   const MetricInfo* found = nullptr;
@@ -169,11 +163,7 @@ AddedMetric copied(const MetricInfo& info, MotionMetric metric) {
   return {texts->name, std::move(texts), own, std::move(metric)};
 }
 
-std::vector<std::string> catalogue_names() {
-  std::vector<std::string> names;
-  for (const MetricInfo& info : metric_catalogue()) names.emplace_back(info.name);
-  return names;
-}
+std::vector<std::string> catalogue_names() { return names_of(metric_catalogue()); }
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/tasks/task_definition.h"
@@ -91,11 +92,7 @@ constexpr Option kOptions[] = {
     option<kDiagnostics, &G::dof_error>("diagnostics.dof_error", "mean_abs mean_norm rms"),
 };
 
-const Option& find_option(const std::string& name) {
-  for (const Option& option : kOptions)
-    if (option.name == name) return option;
-  throw std::invalid_argument(unknown_name_message("reading option", name, reading_names()));
-}
+const Option& find_option(const std::string& name) { return entry_named(kOptions, "reading option", name); }
 
 std::vector<std::string> split(std::string_view names) {
   std::vector<std::string> parts;
@@ -135,11 +132,7 @@ std::string reading(const Readings& readings, const std::string& option) {
   return found.values.empty() ? std::to_string(value) : split(found.values).at(value - found.first);
 }
 
-std::vector<std::string> reading_names() {
-  std::vector<std::string> names;
-  for (const Option& option : kOptions) names.emplace_back(option.name);
-  return names;
-}
+std::vector<std::string> reading_names() { return names_of(kOptions); }
 
 std::vector<std::string> reading_values(const std::string& option) {
   const Option& found = find_option(option);

@@ -15,6 +15,7 @@
 
 #include "duet/backends/engine_module.h"
 #include "duet/core/machine.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/execution/missing_tags.h"
@@ -192,8 +193,7 @@ TablePair table_of(const Run& run, const std::string& name) {
   const RunTables tables = tables_of(run.rows, run);
   std::vector<std::string> known = run_analysis_names();
   known.emplace_back("metrics");
-  if (std::ranges::find(known, name) == known.end())
-    throw std::invalid_argument(unknown_name_message("table", name, known));
+  require_known("table", name, known);
   if (name == kLeaderboardName) return pair_of(leaderboard_analysis(tables.leaderboard, tables.metrics.all, false));
   return pair_of(run_analysis(tables, name == "metrics" ? kLeaderboardName : name));
 }

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "duet/core/file.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/recording.h"
 #include "duet/core/require.h"
@@ -79,12 +80,7 @@ class Loader {
     return it == urdf_.links.end() ? -1 : static_cast<int>(it - urdf_.links.begin());
   }
 
-  std::vector<std::string> urdf_link_names() const {
-    std::vector<std::string> names;
-    names.reserve(urdf_.links.size());
-    for (const UrdfLink& link : urdf_.links) names.push_back(link.name);
-    return names;
-  }
+  std::vector<std::string> urdf_link_names() const { return names_of(urdf_.links); }
 
   // The base is the root, or the only child of a massless root through a floating joint (a "world" link).
   void find_base() {

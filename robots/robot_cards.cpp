@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -43,13 +44,6 @@ void refuse_repeats(const std::vector<RobotCardFile>& cards) {
                                    cards[i - 1].path, cards[i].path));
 }
 
-std::vector<std::string> names_of_cards(const std::vector<RobotCardFile>& cards) {
-  std::vector<std::string> names;
-  names.reserve(cards.size());
-  for (const RobotCardFile& card : cards) names.push_back(card.name);
-  return names;
-}
-
 const RobotCardFile* find_card(const std::vector<RobotCardFile>& cards, const std::string& name) {
   const auto found = std::ranges::find(cards, name, &RobotCardFile::name);
   return found == cards.end() ? nullptr : &*found;
@@ -72,8 +66,7 @@ std::vector<RobotCardFile> robot_cards() {
 
 std::string shipped_card(const std::string& name) {
   const std::vector<RobotCardFile> cards = robot_cards();
-  if (const RobotCardFile* card = find_card(cards, name)) return card->path;
-  throw std::invalid_argument(unknown_name_message("robot", name, names_of_cards(cards)));
+  return entry_named(cards, "robot", name).path;
 }
 
 std::string card_path(const std::string& name_or_path) {
@@ -81,7 +74,7 @@ std::string card_path(const std::string& name_or_path) {
   const std::vector<RobotCardFile> cards = robot_cards();
   if (const RobotCardFile* card = find_card(cards, name_or_path)) return card->path;
   throw MissingError(fmt::format("{} (looked for robots/*/{}.yaml in {})",
-                                 unknown_name_message("robot", name_or_path, names_of_cards(cards)), name_or_path,
+                                 unknown_name_message("robot", name_or_path, names_of(cards)), name_or_path,
                                  fmt::join(share_folders(), ", ")));
 }
 

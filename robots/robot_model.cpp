@@ -5,19 +5,12 @@
 
 #include <algorithm>
 
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 
 namespace duet {
 namespace {
-
-template <typename Entries>
-std::vector<std::string> names_of(const Entries& entries) {
-  std::vector<std::string> names;
-  names.reserve(entries.size());
-  for (const auto& entry : entries) names.push_back(entry.name);
-  return names;
-}
 
 template <typename Entries>
 int index_of(const Entries& entries, const char* kind, std::string_view name) {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "duet/core/digest.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/task.h"
@@ -118,8 +119,7 @@ void check_key(const EpisodeRow& row) {
 }
 
 void check_arm(const EpisodeRow& row) {
-  std::vector<std::string> known;
-  for (const EpisodeArmInfo& arm : kEpisodeArms) known.emplace_back(arm.name);
+  const std::vector<std::string> known = names_of(kEpisodeArms);
   if (std::ranges::find(known, row.arm) == known.end())
     throw InputError(fmt::format("episode row: key 'arm': {}", unknown_name_message("arm", row.arm, known)));
 }

@@ -7,7 +7,7 @@
 
 #include "duet/controllers/stance.h"
 #include "duet/core/file.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/training/threads.h"
 
@@ -22,11 +22,7 @@ constexpr const char* kWbcColumns =
     "steps,minutes,return,falls,episode_s,root_xy_m,attitude_rad,upper_body_m,joints_rad,"
     "action_rate,clock,lift_m,rate,std,loss\n";
 
-std::vector<std::string> stage_names() {
-  std::vector<std::string> names;
-  for (const WbcStage& stage : wbc_plan()) names.push_back(stage.name);
-  return names;
-}
+std::vector<std::string> stage_names() { return names_of(wbc_plan()); }
 
 std::string file_of(const std::string& folder, const std::string& stage, const char* name) {
   return (fs::path(folder) / stage / name).string();
@@ -256,11 +252,7 @@ const std::vector<WbcStage>& wbc_plan() {
   return plan;
 }
 
-const WbcStage& find_wbc_stage(const std::string& name) {
-  for (const WbcStage& stage : wbc_plan())
-    if (stage.name == name) return stage;
-  throw std::invalid_argument(unknown_name_message("stage", name, stage_names()));
-}
+const WbcStage& find_wbc_stage(const std::string& name) { return entry_named(wbc_plan(), "stage", name); }
 
 std::vector<WbcRun> wbc_runs(const WbcRun& run) {
   std::vector<WbcRun> runs;

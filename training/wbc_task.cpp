@@ -6,7 +6,7 @@
 
 #include "duet/controllers/stance.h"
 #include "duet/controllers/wbc_sim/observation.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/robots/roles.h"
 
@@ -92,17 +92,9 @@ constexpr Entry kStages[] = {{"stand", stand}, {"walk", walk}, {"brace", brace},
 
 }  // namespace
 
-std::vector<std::string> wbc_stages() {
-  std::vector<std::string> names;
-  for (const Entry& entry : kStages) names.emplace_back(entry.name);
-  return names;
-}
+std::vector<std::string> wbc_stages() { return names_of(kStages); }
 
-WbcTask wbc_stage(const std::string& name) {
-  for (const Entry& entry : kStages)
-    if (name == entry.name) return entry.make();
-  throw std::invalid_argument(unknown_name_message("stage", name, wbc_stages()));
-}
+WbcTask wbc_stage(const std::string& name) { return entry_named(kStages, "stage", name).make(); }
 
 Eigen::VectorXd action_scale(const RobotModel& robot) {
   Eigen::VectorXd scale = Eigen::VectorXd::Constant(robot.dof(), kUpperScale);

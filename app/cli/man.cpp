@@ -6,7 +6,7 @@
 
 #include "duet/app/command.h"
 #include "duet/app/version.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/experiment/plan/shipped_suites.h"
 
 namespace duet::cli {
@@ -116,8 +116,7 @@ std::string script(const CLI::App& app, const std::string& shell) {
 }
 
 void run_completion(const Session& session, const CLI::App& app, const std::string& shell) {
-  if (std::ranges::find(kShells, shell) == kShells.end())
-    throw std::invalid_argument(unknown_name_message("shell", shell, kShells));
+  require_known("shell", shell, kShells);
   const std::string text = script(app, shell);
   print(session, text, {{"shell", shell}, {"script", text}});
 }

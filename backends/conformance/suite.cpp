@@ -10,7 +10,7 @@
 #include "duet/backends/conformance/conformance.h"
 #include "duet/backends/conformance/trial.h"
 #include "duet/backends/engine_module.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 
 namespace duet::conformance {
@@ -102,15 +102,7 @@ double error_of(const Measurement& measurement) {
 
 std::span<const ConformanceScene> scenes() { return kScenes; }
 
-const ConformanceScene& find_scene(std::string_view name) {
-  const auto found =
-      std::find_if(kScenes.begin(), kScenes.end(), [&](const auto& scene) { return scene.name == name; });
-  if (found != kScenes.end()) return *found;
-  std::vector<std::string> names;
-  names.reserve(kScenes.size());
-  for (const ConformanceScene& scene : kScenes) names.emplace_back(scene.name);
-  throw std::invalid_argument(unknown_name_message("conformance scene", name, names));
-}
+const ConformanceScene& find_scene(std::string_view name) { return entry_named(kScenes, "conformance scene", name); }
 
 SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, const Settings& settings) {
   static_cast<void>(engine_module(engine));

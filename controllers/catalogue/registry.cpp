@@ -14,6 +14,7 @@
 #include "duet/controllers/wbc_sim/wbc_sim.h"
 #include "duet/core/field.h"
 #include "duet/core/file.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -163,11 +164,7 @@ LoadedController load_registered(const std::string& name, Robot robot, const Con
 }
 constexpr Entry kRegistered = {"", registered_info, load_registered, no_files};
 
-std::vector<std::string> shipped_names() {
-  std::vector<std::string> names;
-  for (const Entry& entry : kControllers) names.emplace_back(entry.name);
-  return names;
-}
+std::vector<std::string> shipped_names() { return names_of(kControllers); }
 
 const Entry& find_entry(const std::string& name) {
   if (name.ends_with(".yaml")) return kDescriptor;
@@ -204,8 +201,7 @@ LoadedFiles controller_files(const std::string& name, const ControllerOptions& o
 }
 
 void check_controller_options(const ControllerInfo& info, const ControllerOptions& options) {
-  std::vector<std::string> known;
-  for (const ControllerOption& option : info.options) known.push_back(option.name);
+  std::vector<std::string> known = names_of(info.options);
   for (const ControllerOption& option : common_controller_options()) known.push_back(option.name);
   check_options("controller", info.name, options, known);
 }

@@ -12,7 +12,7 @@
 #include "duet/controllers/descriptor_controller.h"
 #include "duet/controllers/import/draft.h"
 #include "duet/core/file.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/nn/catalogue/load_network.h"
 #include "duet/robots/robot_cards.h"
@@ -46,9 +46,7 @@ class Importer {
     read();
     if (draft_.terms.empty())
       throw InputError(fmt::format("'{}': expected terms of an observation, found none", request_.file));
-    std::vector<std::string> joints;
-    for (const DescriptorJoint& joint : draft_.joints) joints.push_back(joint.name);
-    body_ = body_of(joints, request_.robot, request_.file);
+    body_ = body_of(names_of(draft_.joints), request_.robot, request_.file);
     made_.kind = draft_.kind;
     made_.robot = body_.card;
     made_.name = request_.name.empty() ? plain(fs::path(request_.file).stem().string()) : request_.name;

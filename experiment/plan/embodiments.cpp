@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "duet/controllers/catalogue/registry.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/experiment/plan/actuation_limits.h"
@@ -75,12 +76,7 @@ bool has_explicit_law(const Suite& suite) {
 // Its descriptor was read with the suite, and is now.
 void require_same_facts(const SuiteController& controller) {
   const ControllerInfo then = about(controller), now = controller_info(controller.use);
-  const auto names = [](const ControllerInfo& info) {
-    std::vector<std::string> list;
-    for (const ControllerOption& option : info.options) list.push_back(option.name);
-    return list;
-  };
-  if (then.robot != now.robot || then.walks != now.walks || names(then) != names(now))
+  if (then.robot != now.robot || then.walks != now.walks || names_of(then.options) != names_of(now.options))
     throw InputError(fmt::format("{}: was replaced since the suite was read: begin again", controller.use));
 }
 

@@ -11,7 +11,7 @@
 
 #include "duet/backends/actuation.h"
 #include "duet/backends/engine_module.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/robots/yaml_section.h"
 #include "duet/rows/episode_row.h"
@@ -233,11 +233,7 @@ void SwitchedSuite::take(const Sides& from, const Sides& to, const SwitchOptions
           options.from, options.to, switches_.size(), fmt::join(names(), ", "), kMostSwitches);
 }
 
-std::vector<std::string> SwitchedSuite::names() const {
-  std::vector<std::string> names;
-  for (const EngineSwitch& of : switches_) names.push_back(of.name);
-  return names;
-}
+std::vector<std::string> SwitchedSuite::names() const { return names_of(switches_); }
 
 std::string SwitchedSuite::cell_name(unsigned cell) const {
   return cell == 0 ? "from" : cell + 1 == cells() ? "to" : set_name(names(), cell, "+");

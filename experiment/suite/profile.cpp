@@ -8,6 +8,7 @@
 #include "duet/backends/engine_module.h"
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/robot_state.h"
@@ -19,11 +20,7 @@ namespace {
 
 constexpr std::string_view kProfileSchema = "duet.profile/1";
 
-std::vector<std::string> physics_engines() {
-  std::vector<std::string> names;
-  for (const EngineInfo& engine : engines()) names.push_back(engine.name);
-  return names;
-}
+std::vector<std::string> physics_engines() { return names_of(engines()); }
 
 EngineSettings read_settings(const YAML::Node& node, const std::string& engine, const std::string& file) {
   const auto fail = [&](const YAML::Node& at, const std::string& message) {
@@ -92,8 +89,7 @@ Profile load_profile(const std::string& profile) {
   };
   if (std::filesystem::is_regular_file(profile)) return load(profile);
   const std::vector<std::string> names = profile_names();
-  require(std::find(names.begin(), names.end(), profile) != names.end(),
-          unknown_name_message("engine profile (or file)", profile, names));
+  require_known("engine profile (or file)", profile, names);
   return load((shipped_folder() / (profile + ".yaml")).string());
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/metrics/contact_limits.h"
@@ -13,25 +14,6 @@
 #include "duet/robots/yaml_schema.h"
 
 namespace duet {
-namespace {
-
-template <typename Item>
-std::vector<std::string> names_of(const std::vector<Item>& items) {
-  std::vector<std::string> names;
-  names.reserve(items.size());
-  for (const Item& item : items) names.push_back(item.name);
-  return names;
-}
-
-template <typename Item>
-const Item& find_named(const std::vector<Item>& items, const char* kind, const std::string& name) {
-  const auto found = std::find_if(items.begin(), items.end(), [&](const Item& item) { return item.name == name; });
-  require(found != items.end(), unknown_name_message(kind, name, names_of(items)));
-  return *found;
-}
-
-}  // namespace
-
 std::size_t SuiteClips::copies() const {
   return std::max<std::size_t>(1, variants.size()) * (roles == ClipRoles::kBoth ? 2 : 1);
 }
@@ -54,16 +36,16 @@ Tags tags_of(const ClipVariant& variant) {
 bool Suite::runs_in(std::string_view engine) const { return std::ranges::find(engines, engine) != engines.end(); }
 
 const SuiteController& Suite::controller(const std::string& name) const {
-  return find_named(controllers, "controller", name);
+  return entry_named(controllers, "controller", name);
 }
 
 SuitePolicy Suite::policy(const std::string& name) const {
   const bool control = name == kNullPolicy || std::ranges::find(controls, name) != controls.end();
-  return control ? SuitePolicy{name} : find_named(policies, "policy", name);
+  return control ? SuitePolicy{name} : entry_named(policies, "policy", name);
 }
 
 Perturbation Suite::perturbation(const std::string& name) const {
-  return name == kCleanName ? Perturbation{} : find_named(perturbations, "perturbation", name);
+  return name == kCleanName ? Perturbation{} : entry_named(perturbations, "perturbation", name);
 }
 
 std::vector<std::string> Suite::controller_names() const { return names_of(controllers); }

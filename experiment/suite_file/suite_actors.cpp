@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "duet/controllers/catalogue/registry.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/clips.h"
@@ -177,9 +178,7 @@ void check_options_of(const SuiteController& controller) {
 void check_options_of(const SuitePolicy& policy) {
   const PolicyInfo info = policy_info(policy.use);
   require(policy.name != kNullPolicy || policy.options.empty(), "policy 'null': expected no option of the control arm");
-  std::vector<std::string> known;
-  for (const PolicyOption& option : info.options) known.push_back(option.name);
-  check_options("policy", policy.name, policy.options, known);
+  check_options("policy", policy.name, policy.options, names_of(info.options));
   for (const auto& [option, word] : {std::pair{kHandServo, "servo"}, std::pair{kAverage, "average"}}) {
     const auto given = policy.options.find(option);
     require(given == policy.options.end() || given->second == "false" || policy.name.find(word) != std::string::npos,

@@ -5,6 +5,7 @@
 
 #include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/episode.h"
@@ -75,8 +76,7 @@ void require_known_engines(const YamlSection& top, const Suite& suite) {
   std::vector<std::string> known = {std::string(kPlaybackEngine)};
   for (const EngineInfo& engine : engines()) known.push_back(engine.name);
   checked(top, "engines", [&] {
-    for (const std::string& name : suite.engines)
-      require(std::ranges::find(known, name) != known.end(), unknown_name_message("engine", name, known));
+    for (const std::string& name : suite.engines) require_known("engine", name, known);
   });
 }
 

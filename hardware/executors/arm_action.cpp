@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 
 namespace duet {
 
@@ -13,12 +13,6 @@ const ArmPreset* arm_preset(int id) {
   return found == kArmPresets.end() ? nullptr : &*found;
 }
 
-const ArmPreset& arm_preset(const std::string& name) {
-  const auto found = std::ranges::find(kArmPresets, name, &ArmPreset::name);
-  if (found != kArmPresets.end()) return *found;
-  std::vector<std::string> names;
-  for (const ArmPreset& preset : kArmPresets) names.emplace_back(preset.name);
-  throw std::invalid_argument(unknown_name_message("arm action", name, names));
-}
+const ArmPreset& arm_preset(const std::string& name) { return entry_named(kArmPresets, "arm action", name); }
 
 }  // namespace duet

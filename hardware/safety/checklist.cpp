@@ -11,7 +11,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/json.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/robots/yaml_schema.h"
 
@@ -83,11 +83,7 @@ ChecklistAnswer read_answer(const std::string& file, const YAML::Node& node, con
 
 }  // namespace
 
-std::vector<std::string> checklist_names() {
-  std::vector<std::string> names;
-  for (const ChecklistItem& item : kChecklist) names.emplace_back(item.name);
-  return names;
-}
+std::vector<std::string> checklist_names() { return names_of(kChecklist); }
 
 std::string empty_checklist(const std::string& robot, const std::string& configuration, const std::string& card,
                             double now) {

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "duet/core/file.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/motion/layouts/joint_recipes.h"
@@ -156,17 +157,9 @@ Eigen::Vector3d offset(const JointRecipe& recipe, const PointTracks::ConstFrame&
 
 }  // namespace
 
-const JointLayout& joint_layout(std::string_view name) {
-  for (const JointLayout& layout : layouts())
-    if (layout.name == name) return layout;
-  throw std::invalid_argument(unknown_name_message("skeleton", name, joint_layout_names()));
-}
+const JointLayout& joint_layout(std::string_view name) { return entry_named(layouts(), "skeleton", name); }
 
-std::vector<std::string> joint_layout_names() {
-  std::vector<std::string> names;
-  for (const JointLayout& layout : layouts()) names.push_back(layout.name);
-  return names;
-}
+std::vector<std::string> joint_layout_names() { return names_of(layouts()); }
 
 JointLayout layout_of_names(std::string name, std::vector<std::string> names) {
   const BodyColumns columns = body_columns(name, names);

@@ -11,7 +11,7 @@
 #include "duet/core/file.h"
 #include "duet/core/file_batch.h"
 #include "duet/core/machine.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/hardware/guard/guard_message.h"
 #include "duet/hardware/log/limiter_replay.h"
@@ -240,8 +240,7 @@ struct ReportArguments {
 
 void run_log_report(Session& session, const ReportArguments& arguments) {
   static const std::vector<std::string> known = {"md", "csv", "json", "tex"};
-  for (const std::string& format : arguments.formats)
-    require(std::ranges::find(known, format) != known.end(), unknown_name_message("format", format, known));
+  for (const std::string& format : arguments.formats) require_known("format", format, known);
   const Analysis analysis = LogAnalysis(report_of_log(arguments.log), arguments.log).make();
   if (!arguments.output.empty()) {
     FileBatch batch;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "duet/core/file.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/motion/layouts/joint_recipes.h"
@@ -22,15 +23,9 @@ enum class BvhNaming { kCommon, kCmu, kXsens, kSoma };
 constexpr double kHandOfForearm = 0.32;
 constexpr double kApart = 1e-3;  // of a lower leg: nearer joints lie in one place
 
-std::vector<std::string> names_of(const Bvh& bvh) {
-  std::vector<std::string> names;
-  for (const BvhJoint& joint : bvh.joints) names.push_back(joint.name);
-  return names;
-}
-
 class JointFinder {
  public:
-  explicit JointFinder(const Bvh& bvh) : bvh_(bvh), names_(without_prefix(names_of(bvh))) {}
+  explicit JointFinder(const Bvh& bvh) : bvh_(bvh), names_(without_prefix(names_of(bvh.joints))) {}
 
   [[nodiscard]] int find(const std::string& name) const {
     for (std::size_t j = 0; j < names_.size(); ++j)
@@ -350,7 +345,7 @@ class PartFinder {
 BvhSkeleton by_user_names(const Bvh& bvh, const std::string& file) {
   const std::optional<JointNameMap> map = parse_joint_name_map(read_plain_text(file), file);
   if (!map) throw InputError(fmt::format("'{}': expected lines 'left_hip: NAME IN THE BVH FILE', found none", file));
-  BvhSkeleton skeleton = PartFinder(bvh, mapped(*map, names_of(bvh), bvh.name)).find();
+  BvhSkeleton skeleton = PartFinder(bvh, mapped(*map, names_of(bvh.joints), bvh.name)).find();
   skeleton.naming = "as told";
   return skeleton;
 }
@@ -362,7 +357,7 @@ BvhSkeleton by_known_names(const Bvh& bvh) {
     return by_naming(bvh);
   } catch (const InputError& error) {
     try {
-      return PartFinder(bvh, without_prefix(names_of(bvh))).find();
+      return PartFinder(bvh, without_prefix(names_of(bvh.joints))).find();
     } catch (const InputError&) {
       throw InputError(fmt::format("{}; --skeleton FILE says which joint is which", error.what()));
     }

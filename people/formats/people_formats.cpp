@@ -8,6 +8,7 @@
 
 #include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/motion/people/people_files.h"
@@ -74,11 +75,7 @@ std::span<const PeopleFormat> people_formats() {
   return table;
 }
 
-std::vector<std::string> people_format_names() {
-  std::vector<std::string> names;
-  for (const PeopleFormat& format : people_formats()) names.emplace_back(format.name);
-  return names;
-}
+std::vector<std::string> people_format_names() { return names_of(people_formats()); }
 
 const PeopleFormat& find_people_format(std::span<const std::string> paths, std::string_view name) {
   require(!paths.empty(), "expected the path of a motion of two people, found none");

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "duet/core/field.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/policies/averaged_partner.h"
@@ -108,11 +109,7 @@ PolicyMaker registered_maker(const std::string& name, Robot robot, const PolicyO
 }
 constexpr Entry kRegistered = {"", registered_info, registered_maker, no_files};
 
-std::vector<std::string> shipped_names() {
-  std::vector<std::string> names;
-  for (const Entry& entry : kPolicies) names.emplace_back(entry.name);
-  return names;
-}
+std::vector<std::string> shipped_names() { return names_of(kPolicies); }
 
 const Entry& find_entry(const std::string& name) {
   if (name.ends_with(".yaml")) return kDescriptor;
@@ -205,8 +202,7 @@ LoadedFiles policy_files(const std::string& name, const PolicyOptions& options) 
 PolicyMaker policy_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
   const Entry& entry = find_entry(name);
   const PolicyInfo info = info_of(entry, name);
-  std::vector<std::string> known;
-  for (const PolicyOption& option : info.options) known.push_back(option.name);
+  std::vector<std::string> known = names_of(info.options);
   check_options("policy", name, options, known);
   PolicyOptions own = options;
   const CommonOptions common = take_common(entry, name, own);

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/policies/language.h"
 #include "duet/robots/roles.h"
@@ -133,11 +134,7 @@ bool is_control(std::string_view policy) {
   return std::ranges::any_of(kControls, [&](const ControlScript& script) { return script.name == policy; });
 }
 
-std::vector<std::string> control_names() {
-  std::vector<std::string> names;
-  for (const ControlScript& script : kControls) names.emplace_back(script.name);
-  return names;
-}
+std::vector<std::string> control_names() { return names_of(kControls); }
 
 PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot) {
   require(robot != nullptr, "policy '{}' needs a robot", name);

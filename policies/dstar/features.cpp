@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "duet/core/json.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/recording.h"
 #include "duet/core/require.h"
@@ -215,8 +216,7 @@ constexpr Division kDivisions[] = {
 };
 
 std::vector<std::string> known_names() {
-  std::vector<std::string> names;
-  for (const Size& size : kSizes) names.emplace_back(size.name);
+  std::vector<std::string> names = names_of(kSizes);
   for (const Switch& one : kSwitches) names.emplace_back(one.name);
   return names;
 }

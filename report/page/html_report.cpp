@@ -7,6 +7,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "duet/core/named_table.h"
 #include "duet/report/page/html_page.h"
 #include "duet/report/ranking/leaderboard.h"
 #include "duet/report/ranking/ranking.h"
@@ -128,9 +129,7 @@ std::string episodes_section(const ReportContent& content) {
 TitledTable metric_table(const std::vector<std::pair<std::string, std::map<std::string, double>>>& sets,
                          const std::vector<MetricColumn>& columns) {
   TitledTable titled{.table = {.header = {"Metric"}}};
-  std::vector<std::string> names;
-  names.reserve(columns.size());
-  for (const MetricColumn& column : columns) names.push_back(column.name);
+  std::vector<std::string> names = names_of(columns);
   for (const auto& [head, values] : sets) {
     titled.table.header.push_back(head);
     for (const auto& [name, value] : values)

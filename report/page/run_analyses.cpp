@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "duet/archives/zip/zip.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/report/page/training_curves.h"
 #include "duet/report/ranking/leaderboard_rows.h"
 #include "duet/report/ranking/policy_table.h"
@@ -104,16 +104,10 @@ std::vector<Analysis> run_analyses(const RunTables& tables, Extent extent) {
 }
 
 Analysis run_analysis(const RunTables& tables, std::string_view name) {
-  for (const ListedAnalysis& listed : kAnalyses)
-    if (listed.name == name) return listed.make(tables);
-  throw std::invalid_argument(unknown_name_message("table", std::string(name), run_analysis_names()));
+  return entry_named(kAnalyses, "table", name).make(tables);
 }
 
-std::vector<std::string> run_analysis_names() {
-  std::vector<std::string> names;
-  for (const ListedAnalysis& listed : kAnalyses) names.emplace_back(listed.name);
-  return names;
-}
+std::vector<std::string> run_analysis_names() { return names_of(kAnalyses); }
 
 std::string run_text(const std::vector<Analysis>& analyses) {
   std::vector<std::string> parts;

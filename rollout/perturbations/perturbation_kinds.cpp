@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "duet/backends/actuation.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/robots/yaml_section.h"
@@ -294,11 +295,7 @@ Perturbation read_item(const YamlSection& suite, const YAML::Node& node, const s
 }  // namespace
 
 const std::vector<std::string>& perturbation_kinds() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> all;
-    for (const PerturbationKind& known : perturbation_kind_table()) all.push_back(known.name);
-    return all;
-  }();
+  static const std::vector<std::string> names = names_of(perturbation_kind_table());
   return names;
 }
 

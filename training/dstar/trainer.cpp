@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "duet/core/file.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 
 namespace duet {
 namespace {
@@ -99,20 +99,12 @@ std::string dstar_checkpoint(const DstarRun& run) { return file_of(run, "checkpo
 std::string dstar_network_file(const DstarRun& run) { return file_of(run, "network.safetensors"); }
 std::string dstar_curves(const DstarRun& run) { return file_of(run, "curves.csv"); }
 
-std::vector<std::string> dstar_variants() {
-  std::vector<std::string> names;
-  for (const Variant& variant : kVariants) names.emplace_back(variant.name);
-  return names;
-}
+std::vector<std::string> dstar_variants() { return names_of(kVariants); }
 
 void set_variant(DstarRun& run, const std::string& name) {
-  for (const Variant& variant : kVariants) {
-    if (name != variant.name) continue;
-    run.name = name;
-    variant.set(run);
-    return;
-  }
-  throw std::invalid_argument(unknown_name_message("policy to train", name, dstar_variants()));
+  const Variant& variant = entry_named(kVariants, "policy to train", name);
+  run.name = name;
+  variant.set(run);
 }
 
 }  // namespace duet

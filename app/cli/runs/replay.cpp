@@ -8,7 +8,7 @@
 #include "duet/core/file.h"
 #include "duet/core/file_batch.h"
 #include "duet/core/machine.h"
-#include "duet/core/names.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/replay/replay_content.h"
@@ -39,8 +39,7 @@ std::string format_of(const ReplayArguments& arguments) {
     format = ending.substr(1);
   }
   if (format.empty()) format = "html";
-  require(std::ranges::find(kReplayFormats, format) != kReplayFormats.end(),
-          unknown_name_message("format", format, kReplayFormats));
+  require_known("format", format, kReplayFormats);
   return format;
 }
 
@@ -211,11 +210,9 @@ void run_agree(Session& session, const AgreeArguments& arguments) {
   const Run run = open_run(arguments.run);
   const std::vector<Rater> raters = read_ratings(arguments.ratings, run.rows, arguments.run);
   const HumanAgreement agreement = human_agreement(run.rows, raters, arguments.options);
-  std::vector<std::string> names;
-  for (const Rater& rater : raters) names.push_back(rater.name);
   print(session, terminal_text(agreement.analysis),
         {{"run", arguments.run},
-         {"raters", names},
+         {"raters", names_of(raters)},
          {"episodes", agreement.episodes},
          {"majority", {{"yes", agreement.yes}, {"no", agreement.no}}},
          {"agreement", analysis_json(agreement.analysis)},

@@ -10,6 +10,7 @@
 #include "duet/app/command.h"
 #include "duet/core/file_batch.h"
 #include "duet/core/machine.h"
+#include "duet/core/named_table.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/execution/report_content.h"
@@ -63,9 +64,7 @@ std::vector<Run> load_runs(const ReportArguments& arguments) {
 
 void check_formats(const std::vector<std::string>& formats) {
   static const std::vector<std::string> known = {"md", "csv", "json", "tex", "html", "sqlite"};
-  for (const std::string& format : formats)
-    require(std::find(known.begin(), known.end(), format) != known.end(),
-            unknown_name_message("format", format, known));
+  for (const std::string& format : formats) require_known("format", format, known);
 }
 
 // The columns asked for, of the tables that LaTeX gets. Throws where no table has one of them.
@@ -78,8 +77,7 @@ std::vector<Analysis> with_columns_of_latex(std::vector<Analysis> analyses, cons
         if (std::ranges::find(known, header[i]) == known.end()) known.push_back(header[i]);
       if (!columns.empty()) titled = with_columns(std::move(titled), columns);
     }
-  for (const std::string& column : columns)
-    require(std::ranges::find(known, column) != known.end(), unknown_name_message("column", column, known));
+  for (const std::string& column : columns) require_known("column", column, known);
   return analyses;
 }
 

@@ -10,6 +10,7 @@
 #include "duet/app/command.h"
 #include "duet/backends/engine_module.h"
 #include "duet/core/file_batch.h"
+#include "duet/core/named_table.h"
 #include "duet/core/require.h"
 #include "duet/experiment/suite/profile.h"
 #include "duet/report/page/html_page.h"
@@ -38,9 +39,7 @@ std::vector<std::string> chosen_engines(const ValidateArguments& arguments) {
 std::vector<std::string> chosen_scenes(const ValidateArguments& arguments) {
   for (const std::string& name : arguments.scenes) static_cast<void>(conformance::find_scene(name));
   if (!arguments.scenes.empty()) return arguments.scenes;
-  std::vector<std::string> names;
-  for (const conformance::ConformanceScene& scene : conformance::scenes()) names.emplace_back(scene.name);
-  return names;
+  return names_of(conformance::scenes());
 }
 
 std::vector<conformance::EngineReport> run_scenes(const ValidateArguments& arguments, const Profile& profile,
