@@ -22,8 +22,6 @@ constexpr const char* kWbcColumns =
     "steps,minutes,return,falls,episode_s,root_xy_m,attitude_rad,upper_body_m,joints_rad,"
     "action_rate,clock,lift_m,rate,std,loss\n";
 
-std::vector<std::string> stage_names() { return names_of(wbc_plan()); }
-
 std::string file_of(const std::string& folder, const std::string& stage, const char* name) {
   return (fs::path(folder) / stage / name).string();
 }

@@ -1,4 +1,5 @@
 // The form that somebody fills in before a robot is armed: what is missing, stale or of something else.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <string>
@@ -223,7 +224,7 @@ TEST(RobotConfig, ARobotHasNoOdometryUntilItIsNamed) {
 
 TEST(RobotConfig, OfTheExamplesAreTwins) {
   for (const char* name : {"homie", "sport", "camera", "lowcmd", "vendor_arm"}) {
-    const RobotConfig config = read_robot_config(std::string(DUET_SOURCE_DIR) + "/examples/hardware/" + name + ".yaml");
+    const RobotConfig config = read_robot_config(fmt::format("{}/examples/hardware/{}.yaml", DUET_SOURCE_DIR, name));
     EXPECT_TRUE(config.twin) << name;
     EXPECT_EQ(executor_refusal(config.executor, config.odometry, true), "") << name;
   }
