@@ -50,8 +50,8 @@ struct Verification {
   [[nodiscard]] int rows_not_run() const;
 };
 
-// Sentences for rows that differ: that they were made on another machine, or by a program of another commit, than `here`
-// (both as capture_environment() has them); "" where neither, or where the run does not say.
+// Sentences for rows that differ: that they were made on another machine, or by a program of another commit, than
+// `here` (both as capture_environment() has them); "" where neither, or where the run does not say.
 std::string other_maker_sentences(const nlohmann::json& there, const nlohmann::json& here);
 
 // Throws InputError where the run's inputs, suite, detectors, policies or controllers are not what run.json says or not
