@@ -132,8 +132,8 @@ void multiply_tile(int k, const float* left, const float* right, float* tile) {
   for (int i = 0; i < kAcross * kHigh; ++i) store(sums[i], tile + i * kLanes);
 }
 
-// Of a matrix whose entry (i, l) is from[i along + l across], the rows i < count into panel (k, width), where the rest
-// is zero.
+// Copies rows i < count of a matrix whose entry (i, l) is from[i along + l across] into panel (k, width); the rest of
+// it is zero.
 void pack(const float* from, std::ptrdiff_t along, std::ptrdiff_t across, int count, int width, int k, float* panel) {
   for (int l = 0; l < k; ++l, from += across, panel += width) {
     for (int i = 0; i < count; ++i) panel[i] = from[i * along];
@@ -215,7 +215,7 @@ float exp_of_negative(float x) {
   return y * __builtin_bit_cast(float, exponent);
 }
 
-// The positive and the negative part; a selection would not be vectorised. NaN stays NaN.
+// The sum of the positive and the negative part, so that it is vectorised. NaN stays NaN.
 void elu(int n, float* x) {
   for (int i = 0; i < n; ++i) {
     const float a = x[i];

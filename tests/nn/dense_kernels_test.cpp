@@ -91,6 +91,14 @@ float product_in_order(int cols, const float* w, const float* x, bool rounds_eig
   return lanes[0];
 }
 
+// As gemv_half wants them; `filled`: the columns, filled up.
+std::vector<std::uint16_t> in_halves(const MatrixXf& W, int filled) {
+  std::vector<std::uint16_t> halves(half_size(static_cast<int>(W.rows()), filled), 0);
+  for (int row = 0; row < W.rows(); ++row)
+    for (int c = 0; c < W.cols(); ++c) halves[half_index(row, c, filled)] = Eigen::half(W(row, c)).x;
+  return halves;
+}
+
 std::vector<const DenseKernels*> levels_that_fuse() {
   std::vector<const DenseKernels*> found = levels();
   std::erase_if(found, [](const DenseKernels* kernels) {
@@ -110,9 +118,7 @@ TEST(DenseKernels, SumsHaveOneOrderOnEveryProcessorThatFuses) {
       const int filled = (cols + kHalfColumns - 1) / kHalfColumns * kHalfColumns;
       VectorXf padded = VectorXf::Zero(filled);
       padded.head(cols) = x;
-      std::vector<std::uint16_t> halves(half_size(rows, filled), 0);
-      for (int row = 0; row < rows; ++row)
-        for (int c = 0; c < cols; ++c) halves[half_index(row, c, filled)] = Eigen::half(W(row, c)).x;
+      const std::vector<std::uint16_t> halves = in_halves(W, filled);
       kernels->gemv_half(rows, filled, halves.data(), padded.data(), b.data(), halves_y.data());
       for (int row = 0; row < rows; ++row) {
         EXPECT_EQ(y[row], b[row] + product_in_order(cols, W.row(row).data(), x.data(), true)) << cols << " " << row;
@@ -160,12 +166,9 @@ TEST(DenseKernels, GemvOfHalvesEqualsDoubleForAnyNumberOfRows) {
   constexpr int cols = 3 * kHalfColumns;
   for (const int rows : {1, 3, 4, 13}) {
     const VectorXf x = random_matrix(cols, 1, 5), b = random_matrix(rows, 1, 6);
-    const Eigen::Matrix<Eigen::half, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> W =
-        random_matrix(rows, cols, 4).cast<Eigen::half>();
+    const MatrixXf W = random_matrix(rows, cols, 4).cast<Eigen::half>().cast<float>();
     const Eigen::VectorXd product = W.cast<double>() * x.cast<double>();
-    std::vector<std::uint16_t> halves(half_size(rows, cols), 0);
-    for (int row = 0; row < rows; ++row)
-      for (int c = 0; c < cols; ++c) halves[half_index(row, c, cols)] = W(row, c).x;
+    const std::vector<std::uint16_t> halves = in_halves(W, cols);
     for (const DenseKernels* kernels : levels()) {
       VectorXf y(rows);
       kernels->gemv_half(rows, cols, halves.data(), x.data(), nullptr, y.data());

@@ -61,7 +61,7 @@ std::string text_of(const Verification& found, const VerifyArguments& arguments,
   const int apart = found.different() + found.timed_out();
   text += fmt::format("{} of {} episodes repeat bit for bit{}", static_cast<int>(found.repeats.size()) - apart,
                       found.repeats.size(), open_text(found, arguments));
-  if (found.different() > 0 && !other_maker.empty()) text += '\n' + other_maker;
+  if (!other_maker.empty()) text += '\n' + other_maker;
   return text;
 }
 
@@ -95,7 +95,8 @@ void run_verify(Session& session, VerifyArguments arguments) {
   arguments.options.seed = arguments.seed.value_or(std::random_device()());
   Progress progress(session.progress());
   const Verification found = verify_run(run, arguments.options, progress);
-  const std::string other_maker = other_maker_sentences(run.info.environment, capture_environment());
+  const std::string other_maker =
+      found.different() > 0 ? other_maker_sentences(run.info.environment, capture_environment()) : "";
   print(session, text_of(found, arguments, run.info, other_maker), json_of(found, arguments, run.info));
   session.exit_code = code_of(found, arguments);
 }
