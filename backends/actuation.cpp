@@ -22,11 +22,6 @@ std::string refused_step(double dt) {
   return divides ? "" : step_values();
 }
 
-void check_step(double dt) {
-  const std::string expected = refused_step(dt);
-  require(expected.empty(), "expected {}, found {}", expected, dt);
-}
-
 const std::vector<std::string>& torque_law_names() {
   static const std::vector<std::string> names = {"implicit", "explicit"};
   return names;

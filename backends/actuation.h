@@ -15,13 +15,10 @@
 
 namespace duet {
 
-// Throws std::invalid_argument unless the step [s] divides the control period of 0.02 s.
-void check_step(double dt);
-
 // The values that `dt` may have, for a sentence.
 std::string step_values();
 
-// "" for a step that check_step takes, else step_values().
+// "" for a step that divides the control period, else step_values().
 std::string refused_step(double dt);
 
 // The names of the laws, in the order of TorqueLaw.

@@ -5,7 +5,6 @@
 #include <numbers>
 #include <optional>
 
-#include "duet/core/names.h"
 #include "duet/core/require.h"
 
 namespace duet {
@@ -52,13 +51,6 @@ std::vector<std::string> split(const std::string& text) {
 }  // namespace
 
 std::vector<std::string> root_conversion_names() { return {"printed", "adopted", "direct"}; }
-
-RootConversionLaw root_conversion_law(const std::string& name) {
-  const std::vector<std::string> known = root_conversion_names();
-  const auto it = std::find(known.begin(), known.end(), name);
-  if (it == known.end()) throw std::invalid_argument(unknown_name_message("conversion", name, known));
-  return static_cast<RootConversionLaw>(it - known.begin());
-}
 
 VelocityCommand parse_velocity_command(const std::string& text, double standing) {
   const std::vector<std::string> parts = split(text);

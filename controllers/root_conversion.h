@@ -18,17 +18,14 @@ struct VelocityCommand {
 };
 
 // printed: as A.4.3 has it: v_ref unless (residual <= 0.15 m and speed >= 0.1 m/s), then -v_ref. It never commands 0
-// and
-//          creeps on past the goal.
+//          and creeps on past the goal.
 // adopted: v_ref until the residual is 0.15 m; then brakes while the robot still moves forward (at most 0.6 s) and
-// stands
-//          until the goal has moved by more than 0.15 m and is more than 0.20 m away. It stops up to 0.15 m short.
+//          stands until the goal has moved by more than 0.15 m and is more than 0.20 m away. It stops up to 0.15 m
+//          short.
 // direct:  the reference's own velocity plus proportional control: the closest tracking.
 enum class RootConversionLaw { kPrinted, kAdopted, kDirect };
 
 std::vector<std::string> root_conversion_names();
-// Throws std::invalid_argument for another name than "printed", "adopted", "direct", with the nearest and all known.
-RootConversionLaw root_conversion_law(const std::string& name);
 
 // "vx,vy,wz" or "vx,vy,wz,height"; the height is `standing` where it is not given. Throws std::invalid_argument for
 // anything else.

@@ -324,17 +324,4 @@ std::map<std::string, double> contact_safety_metrics(const ContactSafetyResult& 
   return metrics;
 }
 
-std::string contact_safety_text(const ContactSafetyResult& result) {
-  std::string text =
-      fmt::format("contacts with the person, limits {}: {}\n", result.limits, contact_verdict_name(result.verdict));
-  for (const RegionContact& region : result.regions) {
-    if (region.contacts == 0) continue;
-    text += fmt::format("  {}: peak {:.1f} N, held {:.1f} N, {:.2f} N s, about {:.1f} N/cm2, ", region.region,
-                        region.peak_force, region.quasi_static_force, region.impulse, region.pressure_n_cm2);
-    if (region.worst_ratio) text += fmt::format("{:.2f} of the limit, ", *region.worst_ratio);
-    text += fmt::format("{}\n", contact_verdict_name(region.verdict));
-  }
-  return text;
-}
-
 }  // namespace duet

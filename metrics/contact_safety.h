@@ -239,7 +239,4 @@ std::map<std::string, double> contact_forces(const ContactSafetyResult& result);
 // contact_limit_ratio.
 std::map<std::string, double> contact_safety_metrics(const ContactSafetyResult& result);
 
-// For people: which limits, then one line for each region that was touched.
-std::string contact_safety_text(const ContactSafetyResult& result);
-
 }  // namespace duet

@@ -143,14 +143,6 @@ Interval newcombe_paired(long both, long only_a, long only_b, long neither, doub
                      level);
 }
 
-Interval newcombe_independent(long k_a, long n_a, long k_b, long n_b, double level) {
-  const Interval a = wilson(k_a, n_a, level), b = wilson(k_b, n_b, level);
-  if (n_a == 0 || n_b == 0) return {.low = -1.0, .high = 1.0};
-  const double p_a = static_cast<double>(k_a) / static_cast<double>(n_a);
-  const double p_b = static_cast<double>(k_b) / static_cast<double>(n_b);
-  return newcombe_of_shares(p_a, a, p_b, b);
-}
-
 Interval newcombe_of_shares(double p_a, const Interval& a, double p_b, const Interval& b) {
   return {.low = p_a - p_b - square_and_add(p_a - a.low, b.high - p_b, 0.0),
           .high = p_a - p_b + square_and_add(a.high - p_a, p_b - b.low, 0.0)};

@@ -39,9 +39,7 @@ struct PairCounts {
 };
 Interval newcombe_of(const PairCounts& pairs, double level = 0.95);  // of numbers that need not be whole
 
-// Newcombe's interval (method 10, independent) of k_a / n_a - k_b / n_b. Throws as wilson does.
-Interval newcombe_independent(long k_a, long n_a, long k_b, long n_b, double level = 0.95);
-// The same of two shares whose own intervals are known.
+// Newcombe's interval (method 10, independent) of p_a - p_b, two shares whose own intervals are known.
 Interval newcombe_of_shares(double p_a, const Interval& a, double p_b, const Interval& b);
 
 // Exact two-sided McNemar p-value from the discordant counts.

@@ -92,8 +92,6 @@ constexpr Entry kStages[] = {{"stand", stand}, {"walk", walk}, {"brace", brace},
 
 }  // namespace
 
-std::vector<std::string> wbc_stages() { return names_of(kStages); }
-
 WbcTask wbc_stage(const std::string& name) { return entry_named(kStages, "stage", name).make(); }
 
 Eigen::VectorXd action_scale(const RobotModel& robot) {

@@ -80,7 +80,6 @@ struct WbcTask {
 
 // "stand", "walk", "brace", "interact". Throws std::invalid_argument naming them.
 WbcTask wbc_stage(const std::string& name);
-std::vector<std::string> wbc_stages();
 
 // The cost that RewardWeights::lift weighs: the square of how far a swinging foot is above its wanted height [m]; less
 // above than below.

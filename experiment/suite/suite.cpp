@@ -33,8 +33,6 @@ Tags tags_of(const ClipVariant& variant) {
   return tags;
 }
 
-bool Suite::runs_in(std::string_view engine) const { return std::ranges::find(engines, engine) != engines.end(); }
-
 const SuiteController& Suite::controller(const std::string& name) const {
   return entry_named(controllers, "controller", name);
 }

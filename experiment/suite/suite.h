@@ -202,7 +202,6 @@ struct Suite {
 
   // Whether commanded velocities lead its episodes, in the place of clips and policies.
   [[nodiscard]] bool is_commanded() const { return !references.empty(); }
-  [[nodiscard]] bool runs_in(std::string_view engine) const;
 
   // Throw std::invalid_argument for a name that is not in the suite, with those that are. The clean arm always is: it
   // is playback's.

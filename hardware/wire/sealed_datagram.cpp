@@ -117,8 +117,6 @@ std::uint64_t random_number() {
 
 long refused_datagrams(const NetworkCounts& counts) { return std::accumulate(counts.begin() + 1, counts.end(), 0L); }
 
-std::string_view seal_refusal_text(SealRefusal refusal) { return kSealRefusalTexts[static_cast<std::size_t>(refusal)]; }
-
 std::string network_counts_text(const NetworkCounts& counts) {
   const long refused = refused_datagrams(counts);
   if (counts[0] + refused == 0) return "";

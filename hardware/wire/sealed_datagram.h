@@ -74,8 +74,6 @@ inline constexpr std::array<std::string_view, kSealRefusals> kSealRefusalNames =
 // How many datagrams met each; those without a refusal were taken.
 using NetworkCounts = std::array<long, kSealRefusals>;
 long refused_datagrams(const NetworkCounts& counts);
-// "shorter than a head and a seal"
-std::string_view seal_refusal_text(SealRefusal refusal);
 // "network: 120 taken, 31 refused: 30 forged (another key, or altered on its way), 1 late (...)"; "" where none came.
 std::string network_counts_text(const NetworkCounts& counts);
 

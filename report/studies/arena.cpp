@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <span>
@@ -11,6 +12,7 @@
 
 #include "duet/core/numbers.h"
 #include "duet/core/task.h"
+#include "duet/report/engines/cross_engine.h"
 #include "duet/report/ranking/policy_groups.h"
 #include "duet/report/studies/studies.h"
 
@@ -196,7 +198,8 @@ constexpr std::array<PublicStanding, 6> kPublicStandings = {{{"homie", "homie", 
                                                              {"rl_gym", "rl_gym", 1.3}}};
 constexpr const char* kPublicBenchmark = "teleop-walking-benchmark";
 constexpr std::size_t kFewestRanked = 3;  // of fewer an order says nothing
-constexpr int kOrderResamples = 10000;
+constexpr int kOrderResamples = 10000, kAgreementResamples = 2000;
+constexpr double kSaturated = 1e-9;  // a mean over rungs this near to 0 or 1
 
 const PublicStanding* public_standing(std::string_view controller) {
   const auto found = std::ranges::find(kPublicStandings, controller, &PublicStanding::controller);
@@ -267,6 +270,103 @@ void add_orders(const std::vector<Standing>& standings, double level, Estimates&
         .add("survival", {}, each.survival, kNoInterval, "s");
 }
 
+// The means over rungs of the controllers that ran in all engines of an actuation, one list for each engine; those that
+// every engine puts at 0 or every engine at 1 are left out.
+struct EngineMeans {
+  std::vector<std::vector<double>> of_engine;
+  long saturated = 0;
+
+  [[nodiscard]] std::size_t controllers() const { return of_engine.empty() ? 0 : of_engine.front().size(); }
+};
+
+EngineMeans engine_means(const std::vector<Standing>& standings, const std::string& actuation) {
+  std::set<std::string> engines;
+  std::map<std::string, std::vector<double>> means;  // of a controller, by engine, as `standings` are sorted
+  for (const Standing& standing : standings) {
+    if (standing.entry.actuation != actuation) continue;
+    engines.insert(standing.entry.engine);
+    means[standing.entry.controller].push_back(standing.mean);
+  }
+  EngineMeans result;
+  result.of_engine.resize(engines.size());
+  for (const auto& [controller, of] : means) {
+    if (of.size() != engines.size()) continue;
+    const auto [least, most] = std::ranges::minmax(of);
+    if (most < kSaturated || least > 1.0 - kSaturated) {
+      ++result.saturated;
+      continue;
+    }
+    for (std::size_t i = 0; i < of.size(); ++i) result.of_engine[i].push_back(of[i]);
+  }
+  return result;
+}
+
+struct EngineAgreement {
+  double tau_b = 0.0, lowest = 1.0, violation = 0.0;  // the mean over pairs of engines, the lowest, the mean
+  long pairs = 0;
+};
+
+// Each controller as often as `times` says.
+EngineAgreement agreement_of(const EngineMeans& means, std::span<const double> times) {
+  std::vector<std::vector<double>> drawn(means.of_engine.size());
+  for (std::size_t engine = 0; engine < drawn.size(); ++engine)
+    for (std::size_t i = 0; i < times.size(); ++i)
+      drawn[engine].insert(drawn[engine].end(), static_cast<std::size_t>(times[i]), means.of_engine[engine][i]);
+  EngineAgreement sum;
+  for (std::size_t a = 0; a < drawn.size(); ++a) {
+    for (std::size_t b = a + 1; b < drawn.size(); ++b) {
+      const double tau_b = kendall(drawn[a], drawn[b]).tau_b;
+      sum.tau_b += tau_b;
+      sum.lowest = std::min(sum.lowest, tau_b);
+      sum.violation +=
+          0.5 * (mean_maximum_rank_violation(drawn[a], drawn[b]) + mean_maximum_rank_violation(drawn[b], drawn[a]));
+      ++sum.pairs;
+    }
+  }
+  sum.tau_b /= static_cast<double>(sum.pairs);
+  sum.violation /= static_cast<double>(sum.pairs);
+  return sum;
+}
+
+void add_agreement(const std::vector<Standing>& standings, const std::string& actuation, double level,
+                   Estimates& into) {
+  const EngineMeans means = engine_means(standings, actuation);
+  if (means.of_engine.size() < 2 || means.controllers() < kFewestRanked) return;
+  std::vector<int> numbers(means.controllers());
+  std::iota(numbers.begin(), numbers.end(), 0);
+  const auto interval = [&](double EngineAgreement::*figure) {
+    const auto drawn_again = [&](std::span<const double> times) { return agreement_of(means, times).*figure; };
+    return ClusterBootstrap(kAgreementResamples, 1).weighted(numbers, drawn_again, level);
+  };
+  const EngineAgreement found = agreement_of(means, std::vector<double>(numbers.size(), 1.0));
+  const EstimatesOf of{{.engine = "all", .perturbation = actuation, .of = "engines"}, into};
+  of.count("controllers", {}, static_cast<long>(numbers.size()));
+  of.count("saturated", {}, means.saturated);
+  of.add("mean_tau_b", found.pairs, found.tau_b, interval(&EngineAgreement::tau_b));
+  of.add("lowest_tau_b", found.pairs, found.lowest);
+  of.add("rank_violation", found.pairs, found.violation, interval(&EngineAgreement::violation));
+}
+
+Pivot agreement_pivot(double level) {
+  Pivot pivot{.title = "Arena: whether engines rank alike",
+              .rows = {{"Actuation", &Estimate::perturbation, true}},
+              .columns = {column("Controllers", {.of = "engines", .name = "controllers"}, as_count),
+                          column("Pairs of engines", {.of = "engines", .name = "mean_tau_b"}, as_n),
+                          column("Mean tau-b", {.of = "engines", .name = "mean_tau_b"}, as_decimals(2)),
+                          column("Lowest", {.of = "engines", .name = "lowest_tau_b"}, as_decimals(2)),
+                          column("Rank violation [%]", {.of = "engines", .name = "rank_violation"}, as_percent),
+                          column("Saturated", {.of = "engines", .name = "saturated"}, as_count)}};
+  pivot.notes = {fmt::format(
+      "Kendall's tau-b of two engines' orders of the controllers that ran in all of them, by the mean over rungs: 1 "
+      "the "
+      "same order, -1 the reverse. Rank violation: what taking the other engine's order costs (SIMPLER's mean "
+      "maximum). "
+      "Saturated: all engines at 0 or all at 1, left out, because they agree whatever the order. Intervals: {:g} %, "
+      "controllers drawn again.",
+      100.0 * level)};
+  return pivot;
+}
+
 }  // namespace
 
 Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level) {
@@ -303,11 +403,18 @@ Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level) {
                                       counted(static_cast<long>(messages.size()), "episode"),
                                       escape_markdown(messages.front())));
   analysis.tables = {table_of(analysis.estimates, pivot)};
-  Estimates orders;
+  Estimates orders, agreement;
   add_orders(standings, level, orders);
-  if (orders.empty()) return analysis;
-  analysis.tables.push_back(table_of(orders, order_pivot(level)));
-  analysis.estimates.insert(analysis.estimates.end(), orders.begin(), orders.end());
+  std::set<std::string> actuations;
+  for (const Standing& standing : standings) actuations.insert(standing.entry.actuation);
+  for (const std::string& actuation : actuations) add_agreement(standings, actuation, level, agreement);
+  const auto add_table = [&](const Estimates& of, const Pivot& pivot) {
+    if (of.empty()) return;
+    analysis.tables.push_back(table_of(of, pivot));
+    analysis.estimates.insert(analysis.estimates.end(), of.begin(), of.end());
+  };
+  add_table(orders, order_pivot(level));
+  add_table(agreement, agreement_pivot(level));
   return analysis;
 }
 

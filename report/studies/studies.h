@@ -56,7 +56,8 @@ Analysis level_analysis(const std::vector<EpisodeRow>& rows, double level = 0.95
 // passed where the lower end of the interval of its episodes is .7 or more; its episodes are draws of the suite's
 // noise, poses and pushes. An episode passes as in level_analysis and, where its clip has the tag `arms: followed`,
 // with the upper body within .12 rad of its reference on average. Beside it, where three networks or more are in a
-// public benchmark, too: Kendall's tau-b of the two orders.
+// public benchmark, too: Kendall's tau-b of the two orders; and where three controllers or more that are not saturated
+// ran in all engines of the rows: tau-b and rank violation between engines.
 Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level = 0.95);
 
 // Recorded and synthetic people side by side, as rows' tags say: what each policy achieves with the one and with the

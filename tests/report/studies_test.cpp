@@ -15,6 +15,7 @@ namespace {
 using test::add_episodes;
 using test::estimate;
 using test::estimates_like;
+using ::testing::_;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -335,6 +336,34 @@ TEST(Arena, HoldsItsOrderAgainstThatOfAPublicBenchmark) {
   EXPECT_NEAR(tau_b(tied).value, -1.0 / std::sqrt(5.0 * 6.0), 1e-12);  // 2 pairs agree, 3 do not, 1 is tied
   EXPECT_LT(tau_b(tied).interval.low, tau_b(tied).value);
   EXPECT_GT(tau_b(tied).interval.high, tau_b(tied).value);
+}
+
+// The same rows in another engine.
+void add_engine(std::vector<EpisodeRow> rows, const std::string& engine, std::vector<EpisodeRow>& into) {
+  for (EpisodeRow& row : rows) {
+    row.engine = engine;
+    row.key = episode_key(row);
+  }
+  into.insert(into.end(), rows.begin(), rows.end());
+}
+
+TEST(Arena, SaysWhetherEnginesRankTheUnsaturatedAlike) {
+  std::vector<EpisodeRow> rows = ranked({{"a", 1}, {"b", 2}, {"c", 1}, {"top", 3}, {"none", 0}, {"here", 1}});
+  add_engine(ranked({{"a", 1}, {"b", 2}, {"c", 3}, {"top", 3}, {"none", 0}}), "bullet", rows);
+  const Analysis analysis = arena_analysis(rows);
+  const auto figure = [&](const char* name) { return estimate(analysis, {.of = "engines", .name = name}); };
+  EXPECT_EQ(figure("controllers").value, 3.0);  // "here" ran in one engine
+  EXPECT_EQ(figure("saturated").value, 2.0);
+  EXPECT_NEAR(figure("mean_tau_b").value, 0.0, 1e-12);  // a-b as before, b-c turned round, a-c tied in one
+  EXPECT_EQ(figure("lowest_tau_b").value, figure("mean_tau_b").value);
+  EXPECT_NEAR(figure("rank_violation").value, 1.0 / 3.0, 1e-12);  // 2/9 with mujoco as the reference, else 4/9
+  EXPECT_LE(figure("mean_tau_b").interval.low, 0.0);
+  EXPECT_THAT(analysis.tables.back().table.rows.at(0), ElementsAre("implicit", "3", "1", HasSubstr("0.00"), _, _, "2"));
+}
+
+TEST(Arena, OneEngineAloneHasNoAgreement) {
+  const Analysis one = arena_analysis(ranked({{"a", 1}, {"b", 2}, {"c", 1}}));
+  EXPECT_TRUE(estimates_like(one, {.of = "engines", .name = "mean_tau_b"}).empty());
 }
 
 TEST(Arena, AnOrderOfTwoNetworksSaysNothing) {

@@ -160,7 +160,7 @@ double enumerated_mcnemar(long only_a, long only_b) {
 
 // Newcombe 1998 (Statistics in Medicine 17, 873), table II, example (a), method 10: 56/70 against 48/80.
 TEST(Newcombe, OfTwoIndependentSharesIsThatOfThePaper) {
-  const Interval interval = newcombe_independent(56, 70, 48, 80);
+  const Interval interval = newcombe_of_shares(0.8, wilson(56, 70), 0.6, wilson(48, 80));
   EXPECT_NEAR(interval.low, 0.0524, 5e-5);
   EXPECT_NEAR(interval.high, 0.3339, 5e-5);
 }
