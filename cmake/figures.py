@@ -338,6 +338,25 @@ def actuation_walkers(folder, program):
     return markdown(["walker", "bound", "bound, bare", *[f"`{arm}`" for arm in arms]], [False] + [True] * (2 + len(arms)), table)
 
 
+def foretold(folders, program):
+    """Of how many controllers the static bound foretells in each engine whether they fall in most episodes under the explicit law at 1 ms; of those that stay
+    up there under the implicit law."""
+    steps = {(one["controller"], one["robot"]): one["bare"]["largest_step_s"] for one in json.loads(output([program, "list", "controllers", "--stability", "--json"]))}
+    fell = {}
+    for row in (row for folder in folders for row in rows_in(folder) if row["outcome"] != "unsupported"):
+        fell.setdefault((row["engine"], row["controller"], row["tags"]["perturbation.actuation"]), []).append(row["fell"])
+    falls = {key: 2 * sum(of) > len(of) for key, of in fell.items()}
+    table, sums = [], [0, 0, 0]
+    for engine in ENGINES:
+        some = {c: (steps[c, body_of(c)], does) for (e, c, a), does in falls.items()
+                if (e, a) == (engine, "explicit") and (c, body_of(c)) in steps and not falls[e, c, "implicit"]}
+        wrong = [[c for c, (step, does) in some.items() if does != (1e-3 > factor * step)] for factor in (1, 2)]
+        sums = [a + b for a, b in zip(sums, (len(some), *map(len, wrong)))]
+        table.append([ENGINES[engine], str(len(some)), *[cell for of in wrong for cell in (str(len(some) - len(of)), ", ".join(f"`{c}`" for c in of) or "-")]])
+    table.append(["all", str(sums[0]), *[cell for of in sums[1:] for cell in (f"{sums[0] - of} ({100 * (1 - of / sums[0]):.0f} %)", "")]])
+    return markdown(["Engine", "controllers", "by the bound", "not", "by twice the bound", "not"], [False, True, True, False, True, False], table)
+
+
 def body_of(controller):
     """The robot of a controller's descriptor; duet's own controllers run on the G1."""
     for folder in ("descriptors", "arena"):
@@ -466,6 +485,8 @@ def contents(source, program):
         return lines if any(line.startswith("|") for line in lines) else ["```", *lines, "```"]
     if words[:1] == ["actuation_walkers"] and len(words) == 2:
         return actuation_walkers(words[1], program)
+    if words[:1] == ["foretold"] and len(words) > 1:
+        return foretold(words[1:], program)
     if words[:1] in (["own_worlds"], ["own_worlds_paired"]) and len(words) > 2:
         return (own_worlds if words[0] == "own_worlds" else own_worlds_paired)(*words[1:])
     if words[:1] == ["arena"] and len(words) == 4:
@@ -480,7 +501,7 @@ def contents(source, program):
               "actuation": actuation, "jitter": jitter, "perception": perception}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, partners RUN RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, partners RUN RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, foretold RUN..., own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):
