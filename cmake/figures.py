@@ -398,6 +398,18 @@ def arena_engines(actuation, *folders):
     return markdown(["Controller", *engines, "largest difference"], [False] + [True] * (len(engines) + 1), [line for _, _, line in sorted(table)])
 
 
+def arena_agreement(folder):
+    """Whether engines rank controllers alike, over those that are not saturated."""
+    rows = [r for r in rows_of(folder, "arena.csv") if r["of"] == "engines"]
+    table = []
+    for actuation in dict.fromkeys(r["perturbation"] for r in rows):
+        of = {r["name"]: r for r in rows if r["perturbation"] == actuation}
+        tau, violation = of["mean_tau_b"], of["rank_violation"]
+        table.append([actuation, of["controllers"]["value"], of["saturated"]["value"], f"{float(tau['value']):.2f} [{float(tau['low']):.2f}, {float(tau['high']):.2f}]",
+                      f"{float(of['lowest_tau_b']['value']):.2f}", with_interval(violation)])
+    return markdown(["Actuation", "controllers", "saturated, left out", "mean tau-b", "lowest", "mean maximum rank violation [points]"], [False] + [True] * 5, table)
+
+
 def arena_order(*boards):
     """The networks that a public benchmark ran, too, in its order, beside the boards (FOLDER:ACTUATION, of MuJoCo): the rung reached and the mean over rungs;
     last, how far the orders agree."""
@@ -498,10 +510,10 @@ def contents(source, program):
     if words[:1] in (["people"], ["partners"]) and len(words) == 3:
         return (people if words[0] == "people" else partners)(*words[1:])
     tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
-              "actuation": actuation, "jitter": jitter, "perception": perception}
+              "actuation": actuation, "jitter": jitter, "perception": perception, "arena_agreement": arena_agreement}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, partners RUN RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, foretold RUN..., own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, partners RUN RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., arena_agreement FOLDER, pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, foretold RUN..., own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):

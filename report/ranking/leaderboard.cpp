@@ -97,7 +97,7 @@ void set_success(const RowList& rows, LeaderboardEntry& entry) {
   for (const EpisodeRow* row : rows) success.add(episode_id(*row), headline_success(*row) ? 1.0 : 0.0);
   entry.success = static_cast<double>(entry.k) / static_cast<double>(entry.n);
   entry.interval = success.of_episodes(entry.level);
-  entry.by_clip = success.has_several_draws();
+  entry.by_clip = success.several_a_clip();
 }
 
 LeaderboardEntry summarise(const EntryKey& group, const std::string& task, const RowList& rows,

@@ -30,7 +30,7 @@ struct LeaderboardEntry {
   long unjudged = 0;                       // ended well but no detector ruled on it; counted as a failure
   long plans_late = 0, plans_invalid = 0;  // plans of the policy that were left out, over all its episodes
   long policy_dead = 0;                    // episodes in which the policy gave no plan any more
-  bool by_clip = false;                    // how the intervals are: a clip has several draws
+  bool by_clip = false;                    // how the intervals are: a clip has several episodes
   std::string policy_fault = {};           // message of the first of those, by episode; it is another program's text
 };
 

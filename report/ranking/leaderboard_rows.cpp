@@ -158,8 +158,9 @@ std::vector<std::string> leaderboard_notes(const std::vector<LeaderboardEntry>& 
                   100.0 * entries.front().level)};
   if (std::ranges::any_of(entries, &LeaderboardEntry::by_clip))
     notes.emplace_back(
-        "Clips have several draws, which are no independent episodes: intervals are by clip, and where a clip has "
-        "several draws none is narrower than one episode a clip would give.");
+        "Clips have several episodes (draws, or both roles), which are not independent: intervals are by clip, and "
+        "none "
+        "is narrower than one episode a clip would give.");
   for (std::string note : {small_sample_note(entries), null_arm_note(entries)}) {
     if (!note.empty()) notes.push_back(std::move(note));
   }

@@ -172,12 +172,12 @@ TitledTable ranked_table(const Ranking& board) {
     titled.table.rows.push_back({rank_cell(*row), row->controller, policy_cell(*row), percent(row->mean, row->interval),
                                  percent(row->null_rate), std::to_string(row->fell), std::to_string(row->unfinished),
                                  contact_text(*row), rates_text(*row)});
-  titled.notes = {
-      fmt::format("Equal means have one rank; \"-\" is an arm of reference, no competitor. Intervals of {:g} %: of a "
-                  "mean over engines Wilson's over clips, of one engine Wilson's over episodes, by clip where a clip "
-                  "has several draws. A lead or a lift is claimed where the exact paired test by clip has p of at most "
-                  "{:.2g} over {} clips or more, and its interval leaves 0 out.",
-                  100.0 * board.level, 1.0 - board.level, kFewestClips)};
+  titled.notes = {fmt::format(
+      "Equal means have one rank; \"-\" is an arm of reference, no competitor. Intervals of {:g} %: of a "
+      "mean over engines Wilson's over clips, of one engine Wilson's over episodes, by clip where a clip "
+      "has several episodes. A lead or a lift is claimed where the exact paired test by clip has p of at most "
+      "{:.2g} over {} clips or more, and its interval leaves 0 out.",
+      100.0 * board.level, 1.0 - board.level, kFewestClips)};
   return titled;
 }
 

@@ -243,7 +243,7 @@ TitledTable cell_table(const Estimates& cells, double level) {
                                       column("Success [%]", {.name = "success"}, as_percent),
                                       column("Falls [%]", {.name = "falls"}, as_percent)},
                           .notes = {fmt::format("Each cell has the switches turned that it names; {:g} % Wilson "
-                                                "intervals, by clip where a clip has several draws.",
+                                                "intervals, by clip where a clip has several episodes.",
                                                 100.0 * level)}});
 }
 

@@ -360,7 +360,7 @@ Pivot ladder_pivot(const Ladder& ladder, const std::map<int, std::string>& names
   pivot.columns.push_back(column("Reached", {.of = word, .name = "reached"}, as_count, "none"));
   pivot.notes = {
       fmt::format("Success [%] at each {0}, from easy to hard, with {1:g} % Wilson intervals, by clip where a clip has "
-                  "several draws. Mean: over the {0}s, each counting the same. Reached: the last {0} up to which "
+                  "several episodes. Mean: over the {0}s, each counting the same. Reached: the last {0} up to which "
                   "success is {2:g} % or more at each.",
                   word, 100.0 * level, 100.0 * ladder.pass)};
   return pivot;

@@ -84,8 +84,9 @@ TitledTable success_table(const Estimates& estimates, double level) {
        column("Fell", {.task = kEveryTask, .name = "fell"}, as_count),
        column("Not judged", {.task = kEveryTask, .name = "not_judged"}, as_count)});
   pivot.notes = {fmt::format(
-      "Success under the rule interaction with {:g} % Wilson intervals, and under the detectors robot/paper that ask "
-      "for less. False starts: the robot begins more than {:g} s before its partner, withdrawn beginnings included, of "
+      "Success under the rule interaction with {:g} % Wilson intervals, by clip where a clip has several episodes, and "
+      "under the detectors robot/paper that ask for less. False starts: the robot begins more than {:g} s before its "
+      "partner, withdrawn beginnings included, of "
       "the episodes in which both begin; nobody waits in a hug.",
       100.0 * level, kFalseStart)};
   return table_of(estimates, pivot);
@@ -153,7 +154,7 @@ using PeopleByTask = std::map<std::pair<int, std::string>, BothPeople>;  // by r
 Rate rate_by_clip(const EpisodeRows& rows, bool (*counts)(const EpisodeRow&), double level) {
   SuccessByClip found;
   for (const auto& [id, row] : rows) found.add(id, counts(*row) ? 1.0 : 0.0);
-  return {.n = found.episodes(), .k = found.successes(), .rate = found.mean(), .interval = found.by_clip(level)};
+  return make_rate(found, level);
 }
 
 void add_people(const PolicyKey& key, const std::string& task, const BothPeople& rows, double level, Estimates& into) {

@@ -20,10 +20,6 @@ namespace duet {
 namespace {
 
 // Episodes of one walking command have nothing in common but the command: each stands alone.
-bool is_other_draw(const EpisodeId& a, const EpisodeId& b) {
-  return a.task == b.task && a.clip == b.clip && a.episode != b.episode && a.task != kWalkRows;
-}
-
 int clip_number(const EpisodeId& id, ClipNumbers& numbers) {
   return id.task == kWalkRows ? numbers.of(id.task, fmt::format("{} {}", id.clip, id.episode)) : numbers.of(id);
 }
@@ -43,12 +39,10 @@ bool headline_success(const EpisodeRow& row) { return row.outcome == Outcome::kO
 void SuccessByClip::add(const EpisodeId& id, double success) {
   values_.push_back(success);
   clips_.push_back(clip_number(id, numbers_));
-  several_draws_ = several_draws_ || is_other_draw(last_, id);
-  last_ = id;
 }
 
 Interval SuccessByClip::of_episodes(double level) const {
-  return several_draws_ ? by_clip(level) : wilson(successes(), episodes(), level);
+  return several_a_clip() ? by_clip(level) : wilson(successes(), episodes(), level);
 }
 
 void EpisodePairs::add(const EpisodeRow& a, const EpisodeRow& b) {
@@ -56,8 +50,6 @@ void EpisodePairs::add(const EpisodeRow& a, const EpisodeRow& b) {
   a_.push_back(headline_success(a) ? 1.0 : 0.0);
   b_.push_back(headline_success(b) ? 1.0 : 0.0);
   clips_.push_back(clip_number(episode_id(a), numbers_));
-  several_draws_ = several_draws_ || is_other_draw(last_, episode_id(a));
-  last_ = episode_id(a);
 }
 
 Interval EpisodePairs::bootstrap(const IntervalOptions& options) const {
@@ -69,7 +61,7 @@ Interval EpisodePairs::bootstrap(const IntervalOptions& options) const {
 }
 
 Interval EpisodePairs::of_episodes(double level) const {
-  if (several_draws_) return by_clip(level);
+  if (several_a_clip()) return by_clip(level);
   return newcombe_paired(table_.both, table_.only_a, table_.only_b, table_.neither, level);
 }
 

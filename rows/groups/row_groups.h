@@ -72,16 +72,15 @@ class SuccessByClip {
   [[nodiscard]] double mean() const { return mean_of(values_); }
   // wilson_by_clip; needs an episode.
   [[nodiscard]] Interval by_clip(double level) const { return wilson_by_clip(values_, clips_, level); }
-  // Wilson's over the episodes, each a success or not; by clip where a clip has several draws.
+  // Wilson's over the episodes, each a success or not; by clip where a clip has several.
   [[nodiscard]] Interval of_episodes(double level) const;
-  [[nodiscard]] bool has_several_draws() const { return several_draws_; }
+  // Draws or roles: some clip has more than one episode.
+  [[nodiscard]] bool several_a_clip() const { return clips() < episodes(); }
 
  private:
   std::vector<double> values_;
   std::vector<int> clips_;
   ClipNumbers numbers_;
-  EpisodeId last_;
-  bool several_draws_ = false;
 };
 
 struct PairedTable {
@@ -101,11 +100,11 @@ class EpisodePairs {
   void add(const EpisodeRow& a, const EpisodeRow& b);
   [[nodiscard]] const PairedTable& table() const { return table_; }
   [[nodiscard]] long clips() const { return static_cast<long>(numbers_.size()); }
-  [[nodiscard]] bool has_several_draws() const { return several_draws_; }
+  [[nodiscard]] bool several_a_clip() const { return clips() < table_.pairs(); }
   // Intervals by clip; both need a pair. `p`: sign_flip_exact.
   [[nodiscard]] Interval by_clip(double level) const { return newcombe_by_clip(a_, b_, clips_, level); }
   [[nodiscard]] Interval bootstrap(const IntervalOptions& options) const;  // never narrower than by_clip
-  // Newcombe's over the pairs; by clip where a clip has several draws.
+  // Newcombe's over the pairs; by clip where a clip has several.
   [[nodiscard]] Interval of_episodes(double level) const;
   [[nodiscard]] double p() const;
 
@@ -114,8 +113,6 @@ class EpisodePairs {
   std::vector<double> a_, b_;
   std::vector<int> clips_;
   ClipNumbers numbers_;
-  EpisodeId last_;
-  bool several_draws_ = false;
 };
 
 // The one door through which rows enter statistics. Where policy, controller and start draw no random number, several
