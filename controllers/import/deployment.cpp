@@ -66,10 +66,16 @@ class DeploymentReader {
 
   // The robot's joints in the network's order: `map` says which of its motors each is.
   void set_joints(Draft& draft, const std::vector<int>& map, const std::vector<std::string>& names) {
-    const DraftBody body = names.empty() ? body_of(map.size(), card_, file_) : body_of(names, card_, file_);
-    if (names.empty())
+    const YAML::Node model = root_["xml_path"];
+    const DraftBody body =
+        names.empty() ? body_of(map.size(), card_, file_, model && model.IsScalar() ? model.Scalar() : std::string())
+                      : body_of(names, card_, file_);
+    if (names.empty()) {
+      draft.card = body.card;
       draft.assumed.push_back(
-          fmt::format("the robot is '{}' and motors are numbered as its joints: the file names none", body.card));
+          fmt::format("the robot is '{}'{} and motors are numbered as its joints: the file does not name them",
+                      body.card, card_.empty() ? " (--robot gives another)" : ""));
+    }
     if (const std::vector<int>& arm = body.robot->roles.arms[0]; !arm.empty())
       trunk_ = body.robot->links[body.robot->links[arm.front() + 1].parent].name;
     for (const int motor : map) {

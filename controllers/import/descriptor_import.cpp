@@ -46,7 +46,8 @@ class Importer {
     read();
     if (draft_.terms.empty())
       throw InputError(fmt::format("'{}': expected terms of an observation, found none", request_.file));
-    body_ = body_of(names_of(draft_.joints), request_.robot, request_.file);
+    const std::string& card = request_.robot.empty() ? draft_.card : request_.robot;
+    body_ = body_of(names_of(draft_.joints), card, request_.file);
     made_.kind = draft_.kind;
     made_.robot = body_.card;
     made_.name = request_.name.empty() ? plain(fs::path(request_.file).stem().string()) : request_.name;
@@ -124,8 +125,12 @@ class Importer {
     return joined(texts);
   }
   [[noreturn]] void refuse_sizes(const std::vector<std::string>& sizes, int shown) const {
-    throw InputError(fmt::format("'{}': expected an input of {} numbers ({}), found {}", made_.network, shown,
-                                 joined(sizes), ports(sample_->inputs())));
+    const bool all_larger = std::ranges::all_of(sample_->inputs(), [&](const Port& port) { return port.size > shown; });
+    throw InputError(fmt::format("'{}': expected an input of {} numbers ({}), found {}{}", made_.network, shown,
+                                 joined(sizes), ports(sample_->inputs()),
+                                 all_larger ? ": the network sees more than the file lists; write the descriptor by "
+                                              "hand (docs/extending.md, \"Enter the arena\")"
+                                            : ""));
   }
 
   // The network takes whole frames, and the file says nothing of them.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <sstream>
 
 #include "duet/core/names.h"
@@ -129,12 +130,13 @@ DraftBody body_of(const std::vector<std::string>& joints, const std::string& car
   else
     for (const RobotCardFile& each : robot_cards()) consider(each.name, load_quietly(each.path));
   if (best.robot != nullptr) return best;
-  throw InputError(fmt::format("'{}': expected joints of {}, found '{}', which it lacks{}", file,
-                               card.empty() ? "a robot card" : "robot '" + card + "'", excerpt(lacks),
-                               card.empty() ? " (--robot gives another card)" : ""));
+  throw InputError(
+      fmt::format("'{}': expected joints of {}, found '{}', which it lacks{}", file,
+                  card.empty() ? "a robot card" : "robot '" + card + "'", excerpt(lacks),
+                  card.empty() ? " (--robot gives another card, `duet robot new` makes one of a URDF)" : ""));
 }
 
-DraftBody body_of(std::size_t joints, const std::string& card, const std::string& file) {
+DraftBody body_of(std::size_t joints, const std::string& card, const std::string& file, const std::string& path) {
   if (!card.empty()) {
     const auto robot = load_shared_robot(card_path(card));
     if (robot->joints.size() != joints)
@@ -148,6 +150,10 @@ DraftBody body_of(std::size_t joints, const std::string& card, const std::string
                         [folder = cards.empty() ? std::string() : cards.front().folder](const RobotCardFile& each) {
                           return each.folder == folder;
                         });
+  const std::filesystem::path folders(path);
+  std::stable_partition(cards.begin(), cards.end(), [&](const RobotCardFile& each) {
+    return std::find(folders.begin(), folders.end(), each.name) != folders.end();
+  });
   for (const RobotCardFile& each : cards)
     if (const auto robot = load_quietly(each.path); robot != nullptr && robot->joints.size() == joints)
       return {each.name, robot};

@@ -27,6 +27,7 @@ struct DraftTerm {
 struct Draft {
   std::string kind;       // "holosoma", ...
   std::string network{};  // file name that the file gives; "": none
+  std::string card{};     // of the body whose joints stand for motors without names; "": joints have names
   double rate_hz = kTickRate;
   std::vector<DescriptorJoint> joints{};          // in the network's order
   std::vector<DraftTerm> terms{};                 // in the order of the input
@@ -59,9 +60,9 @@ DraftTerm draft_term(const std::string& name, const TermFacts& facts, const std:
 // The body of joints under the makers' names: the card asked for, else of those that have all of them the one with most
 // of the very names, then with the fewest others. Throws InputError where none has.
 DraftBody body_of(const std::vector<std::string>& joints, const std::string& card, const std::string& file);
-// The body of so many joints whose file names none: the card asked for, else the first of as many, those of the
-// robot that stands in first.
-DraftBody body_of(std::size_t joints, const std::string& card, const std::string& file);
+// The body of so many joints whose file names none: the card asked for, else the first of as many, the one that a
+// folder of `path` names before all others, then those of the robot that stands in.
+DraftBody body_of(std::size_t joints, const std::string& card, const std::string& file, const std::string& path);
 // The robot's joint under a maker's name: without case, "_joint", "-" for "_"; -1: none.
 int joint_of(const RobotModel& robot, const std::string& name);
 

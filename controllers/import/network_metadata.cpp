@@ -207,6 +207,16 @@ class MetadataReader {
     }
   }
 
+  // The body of a tracker's errors; "" where the configuration names none.
+  [[nodiscard]] std::string anchor_of(const YAML::Node& config) const {
+    try {
+      return part(config, {"command", "setup_terms", "motion_command", "params", "motion_config", "body_name_ref"})[0]
+          .as<std::string>();
+    } catch (const std::exception&) {
+      return "";
+    }
+  }
+
   void read_experiment(Draft& draft, const YAML::Node& config) {
     const YAML::Node control = part(config, {"robot", "control"});
     if (const YAML::Node type = control["control_type"]; type && type.Scalar() != "P")
@@ -238,7 +248,7 @@ class MetadataReader {
     std::map<std::string, YAML::Node> terms;
     for (const auto& entry : part(group, {"terms"})) terms[entry.first.Scalar()] = entry.second;
     for (const auto& [name, term] : terms) {
-      TermFacts facts{.scale = {number_or(term, {"scale"}, 1.0)}, .clipped = true};
+      TermFacts facts{.scale = {number_or(term, {"scale"}, 1.0)}, .anchor = anchor_of(config), .clipped = true};
       facts.clock =
           clock(number_or(config, {"command", "setup_terms", "locomotion_gait", "params", "gait_period"}, 1.0));
       const YAML::Node clip = term["clip"];

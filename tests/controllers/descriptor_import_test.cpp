@@ -154,6 +154,15 @@ TEST_F(ImportTest, OfHolosomaTakesItsTablesOrItsExperiment) {
   ASSERT_EQ(e.observation.groups.size(), 3U);
   EXPECT_EQ(e.observation.groups[0].channels[0].kind, ChannelKind::kPreviousAction) << "terms go by their names";
   EXPECT_EQ(e.observation.groups[0].channels[0].clip, 5.0);
+  std::string tracker = keys["experiment_config"];
+  tracker.replace(tracker.find("\"dof_pos\""), 9, "\"motion_ref_ori_b\": {\"scale\": 1.0}, \"dof_pos\"");
+  keys["experiment_config"] = tracker;
+  EXPECT_SENTENCE(refusal({.file = write("bodiless.onnx", network(2 * 93, 29, keys))}));
+  keys["experiment_config"] = tracker.substr(0, tracker.size() - 1) +
+                              R"(, "command": {"setup_terms": {"motion_command": {"params": {"motion_config":
+    {"body_name_ref": ["torso_link"]}}}}}})";
+  EXPECT_THAT(imported({.file = write("tracker.onnx", network(2 * 93, 29, keys))}).text,
+              HasSubstr("anchor_orientation_error, frame: torso_link"));
   keys["experiment_config"] = R"({"robot": {"control": {"control_type": "T"}}})";
   EXPECT_SENTENCE(refusal({.file = write("torque.onnx", network(87, 29, keys))}));
 }
@@ -218,6 +227,22 @@ TEST_F(ImportTest, OfALabsDeploymentTakesItsCommandFromAKeyboardToo) {
   EXPECT_EQ(d.observation.groups[0].channels[0].kind, ChannelKind::kCommandVelocity);
 }
 
+// unitree_rl_gym's H1-2 and its G1 have as many joints of the same names.
+TEST_F(ImportTest, OfRlGymTakesTheRobotThatItsModelNames) {
+  const auto robot_of = [&](const std::string& model, const std::string& robot = "") {
+    const std::string text =
+        "xml_path: \"{LEGGED_GYM_ROOT_DIR}/resources/robots/" + model +
+        "/scene.xml\"\nkps: 100\nkds: 2\ndefault_angles: 0\nang_vel_scale: 0.25\ndof_pos_scale: 1\n"
+        "dof_vel_scale: 0.05\naction_scale: 0.25\ncmd_scale: [2, 2, 0.25]\nnum_actions: 12\n"
+        "num_obs: 47\n";
+    return imported({.file = write("gym.yaml", text), .robot = robot});
+  };
+  EXPECT_EQ(robot_of("h1_2").robot, "h1_2");
+  EXPECT_EQ(robot_of("g1").robot, "g1_12dof") << "the card 'g1' has 29 joints";
+  EXPECT_EQ(robot_of("h1_2", "t1_12dof").robot, "t1_12dof");
+  EXPECT_SENTENCE(robot_of("h1_2").assumed);
+}
+
 TEST_F(ImportTest, OfRlSarTakesNamesAndRateFromTheRobotsFile) {
   std::filesystem::create_directories(folder / "policy");
   write("base.yaml", "robot: {dt: 0.005, decimation: 2, joint_names: " +
@@ -260,6 +285,7 @@ TEST_F(ImportTest, SaysInOneSentenceWhatIsNoNetworkToImport) {
 
 TEST_F(ImportTest, SaysInOneSentenceWhatDoesNotFit) {
   EXPECT_SENTENCE(refusal({.file = write("small.onnx", network(95, 29, mimic))}));
+  EXPECT_SENTENCE(refusal({.file = write("large.onnx", network(154, 29, mimic))}));
   EXPECT_SENTENCE(refusal({.file = write("legs.onnx", network(96, 12, mimic))}));
   EXPECT_SENTENCE(refusal({.file = write("w.onnx", network(96, 29, mimic)), .robot = "t1"}));
   auto other = mimic;
