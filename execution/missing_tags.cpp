@@ -66,7 +66,7 @@ void take_tags(const std::vector<Item>& from, std::vector<Item>& into) {
 // The run's, with the tags of the suite that ships where it is that one: tags are no part of a suite's hash, and one
 // that ships may have more of them by now.
 Suite suite_with_tags(const RunInfo& info) {
-  Suite suite = parse_run_suite(info.suite_yaml, "suite.yaml");
+  Suite suite = parse_run_suite(info.suite_yaml, info.suite_file);
   try {
     if (const std::optional<Suite> shipped = shipped_suite_of(info)) {
       take_tags(shipped->perturbations, suite.perturbations);

@@ -70,7 +70,7 @@ std::vector<std::string> differing_keys(const Suite& one, const Suite& other) {
 
 // Names the cause of a different hash: keys of the suite, or files that they name.
 std::string difference_note(const Suite& shipped, const RunInfo& info) {
-  const Suite run = parse_run_suite(info.suite_yaml, "suite.yaml");
+  const Suite run = parse_run_suite(info.suite_yaml, info.suite_file);
   const std::vector<std::string> keys = differing_keys(shipped, run);
   if (keys == std::vector<std::string>{"clips"} && !run.clips.files.empty())
     return "as it ships but for its clips, which were given";

@@ -254,7 +254,8 @@ Run load_run_head(const std::string& path) {
   run.info = read_run_json(beside(path, "run.json"));
   const std::string environment = beside(path, "env.json");
   run.info.environment = parse_json(read_text(environment), environment);
-  run.info.suite_yaml = read_text(beside(path, "suite.yaml"));
+  run.info.suite_file = beside(path, "suite.yaml");
+  run.info.suite_yaml = read_text(run.info.suite_file);
   return run;
 }
 

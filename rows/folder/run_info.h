@@ -31,7 +31,8 @@ struct RunPlan {
 
 struct RunInfo {
   std::string suite, suite_version, suite_hash;
-  std::string suite_yaml;  // resolved
+  std::string suite_yaml;                 // resolved
+  std::string suite_file = "suite.yaml";  // where it was read: its paths begin at that file's folder
   std::vector<std::string> argv;
   std::string created_at;                                    // UTC, ISO 8601
   nlohmann::json environment;                                // rows/folder/environment.h

@@ -147,6 +147,25 @@ TEST(MissingTags, ASuiteThatCannotBeReadIsSaid) {
   EXPECT_THAT(run.warnings[0], HasSubstr("'there': rows have no tags"));
 }
 
+TEST(MissingTags, ASuiteOfDescriptorsIsReadBesideThem) {
+  const test::ScratchFolder folder;
+  std::filesystem::copy_file(DUET_SOURCE_DIR "/controllers/descriptors/rl_gym.yaml", folder / "mine.yaml");
+  const std::string yaml =
+      "schema: duet.suite/1\nname: s\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
+      "controllers: [{name: mine, use: mine.yaml}]\npolicies: [replay]\nnull_arm: false\n"
+      "perturbations: [{name: a, jitter: {sigma: 0.01}, tags: {level: 1}}]\n";
+  duet::Run run;
+  run.info.suite_yaml = yaml;
+  run.info.suite_file = folder / "suite.yaml";
+  EpisodeRow& row = run.rows.emplace_back();
+  row.clip = synthesize(Task::kWave, {}).id;
+  row.policy = "replay";
+  row.perturbation = "a";
+  add_missing_tags(run);
+  EXPECT_TRUE(run.warnings.empty());
+  EXPECT_EQ(row.tags.text("perturbation.level"), "1");
+}
+
 // No byte of them has changed, and every table that they had is there.
 TEST(MissingTags, PublishedRowsGetThemFromTheirSuite) {
   const auto published = [](const std::string& name) {
