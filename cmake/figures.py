@@ -15,6 +15,7 @@ import argparse
 import csv
 import json
 import pathlib
+import random
 import re
 import shlex
 import statistics
@@ -338,6 +339,30 @@ def actuation_walkers(folder, program):
     return markdown(["walker", "bound", "bound, bare", *[f"`{arm}`" for arm in arms]], [False] + [True] * (2 + len(arms)), table)
 
 
+def explained(folder):
+    """How much of the way from parity to a world of the engine's own, explicit torques and all, law, armature and step make in parity's engine alone. Intervals
+    draw clips again."""
+    of = {}
+    for row in rows_in(folder):
+        of.setdefault((row["engine"], row["controller"], row["policy"], row["perturbation"]), {})[row["clip"]] = (row["outcome"] == "ok" and row["success"], row["fell"])
+    draw, table = random.Random(1), []
+    for engine in (e for e in ENGINES if any(key[0] == f"{e}_own" for key in of)):
+        for policy in dict.fromkeys(key[2] for key in of):
+            here, there = ([of.get((e, "wbc_sim", policy, arm), {}) for e, arm in ((engine, "clean"), (world, "explicit_bare_1ms"))] for world in (engine, f"{engine}_own"))
+            start, alone, end = here[0], here[1], there[1]
+            clips, cells = sorted(start.keys() & alone.keys() & end.keys()), []
+            for what in (0, 1):
+                def sums(some):
+                    return [sum(to[clip][what] - start[clip][what] for clip in some) for to in (end, alone)]
+                gap, part = sums(clips)
+                again = sorted(b / a for a, b in (sums(draw.choices(clips, k=len(clips))) for _ in range(2000)) if a)
+                low, high = again[len(again) // 40], again[-1 - len(again) // 40]
+                cells += [f"{100 * gap / len(clips):+.1f}", f"{100 * part / gap:.0f} [{100 * low:.0f}, {100 * high:.0f}]"]
+            table.append([f"{WORLDS[engine]}, own world", POLICIES[policy], str(len(clips)), *cells])
+    header = ["To", "Policy", "clips", "gap, success [points]", "law + armature + step alone [%]", "gap, falls [points]", "the same of falls [%]"]
+    return markdown(header, [False, False] + [True] * 5, table)
+
+
 def foretold(folders, program):
     """Of how many controllers the static bound foretells in each engine whether they fall in most episodes under the explicit law at 1 ms; of those that stay
     up there under the implicit law."""
@@ -510,10 +535,10 @@ def contents(source, program):
     if words[:1] in (["people"], ["partners"]) and len(words) == 3:
         return (people if words[0] == "people" else partners)(*words[1:])
     tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures,
-              "actuation": actuation, "jitter": jitter, "perception": perception, "arena_agreement": arena_agreement}
+              "actuation": actuation, "jitter": jitter, "perception": perception, "arena_agreement": arena_agreement, "explained": explained}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, partners RUN RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., arena_agreement FOLDER, pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, foretold RUN..., own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, people FOLDER RUN, partners RUN RUN, arena FOLDER ENGINE ACTUATION, arena_engines ACTUATION FOLDER..., arena_order FOLDER:ACTUATION..., arena_agreement FOLDER, explained RUN, pictures FILE, actuation RUN, jitter FOLDER, perception FOLDER, actuation_walkers RUN, foretold RUN..., own_worlds POLICY RUN..., own_worlds_paired POLICY RUN..., suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):
