@@ -127,9 +127,10 @@ struct PerturbationSize {
   std::string beside;  // the kind's other values: "duration: 1, every: 4"
 };
 
-// A clip's tags: who its people are; the clip that shows the same recording in the other role, where there is one
-// before it; what a variant asks for.
-inline constexpr std::string_view kPeopleTag = "clip.people", kRecordingTag = "clip.recording", kSideTag = "clip.side",
+// A clip's tags: who its people are; the kinds of what was made up of them ("gaps+legs"); the clip that shows the same
+// recording in the other role, where there is one before it; what a variant asks for.
+inline constexpr std::string_view kPeopleTag = "clip.people", kMadeUpTag = "clip.made_up",
+                                  kRecordingTag = "clip.recording", kSideTag = "clip.side",
                                   kHeightTag = "clip.target_height";
 inline constexpr std::string_view kRecordedPeople = "recorded", kSyntheticPeople = "synthetic";
 
@@ -138,8 +139,8 @@ inline constexpr std::string_view kRecordedPeople = "recorded", kSyntheticPeople
 inline constexpr std::string_view kMethodTag = "policy.method", kTrainingSeedTag = "policy.seed";
 
 // Those that follow from what a suite runs: nobody may give them.
-inline constexpr std::array<std::string_view, 9> kDerivedTags = {
-    kKindsTag, kFamilyTag, kSizeTag, kUnitTag, kBesideTag, kPeopleTag, kRecordingTag, kSideTag, kHeightTag};
+inline constexpr std::array<std::string_view, 10> kDerivedTags = {
+    kKindsTag, kFamilyTag, kSizeTag, kUnitTag, kBesideTag, kPeopleTag, kMadeUpTag, kRecordingTag, kSideTag, kHeightTag};
 // Those of which a table needs a whole number, by the name that a suite gives them, and how many digits it may have.
 struct WholeTag {
   std::string_view name;

@@ -22,6 +22,7 @@
 #include "duet/metrics/detector.h"
 #include "duet/metrics/locomotion.h"
 #include "duet/metrics/retargeting.h"
+#include "duet/motion/people/made_up.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/people/formats/people_formats.h"
 #include "duet/retarget/solver/pair.h"
@@ -52,6 +53,8 @@ json settings_of(const DatasetPlan& plan, const PeopleFormat& format) {
                         {"align", static_cast<int>(people.align)},
                         {"task", people.task ? json(to_string(*people.task)) : json()},
                         {"reactor", people.reactor ? json(*people.reactor == Person::kA ? "A" : "B") : json()}};
+  if (people.fill_gaps) settings["people"]["fill_gaps_s"] = *people.fill_gaps;
+  if (people.still_partner) settings["people"]["still_partner"] = true;
   json& curation = settings["curation"] = json::object();
   for (const Gate gate : plan.curation.gates) curation["gates"].push_back(to_string(gate));
   for (const auto& [name, limit] : plan.curation.limits) curation["limits"][name] = limit;
@@ -231,6 +234,8 @@ class ClipWork {
 
   static void describe(DatasetEntry& entry, const InteractionClip& clip) {
     entry.provenance = clip.source;
+    entry.made_up = made_up_of(clip.source);
+    std::erase_if(entry.provenance, [](const auto& item) { return item.first.starts_with(kMadeUpKey); });
     entry.task = to_string(clip.task);
     entry.reactor = clip.reactor == Person::kA ? "A" : "B";
     entry.frames = clip.frames();

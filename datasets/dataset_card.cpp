@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "duet/core/file_batch.h"
 #include "duet/core/json.h"
@@ -77,11 +78,17 @@ std::string loading(const nlohmann::json& settings) {
 }
 
 std::vector<Section> sections(std::span<const DatasetEntry> entries, const nlohmann::json& settings) {
+  const TextTable made_up = made_up_table(entries);
+  const char* const made_up_text =
+      made_up.rows.empty() ? ""
+                           : "What the recordings lack: frames of joints that were not seen (gaps), legs below upper "
+                             "bodies, a partner who stands still, frames between those of a low or uneven rate.";
   return {{"Sources", "", source_table(entries)},
           {"Clips by task", "50 Hz, z up, metres, floor at 0.", task_table(entries)},
           {"Curation",
            "What came of each recording. A clip is kept where all four gates pass it; one may be refused by several.",
            outcome_table(entries)},
+          {"Made up", made_up_text, made_up},
           {"Before and after curation", "Means over clips, weighted by their length.", curation_table(entries)},
           {"Retargeting", "Means over the clips kept.", retargeting_table(entries)},
           {"Loading it", "", {}, loading(settings)},
@@ -309,6 +316,21 @@ TextTable retargeting_table(std::span<const DatasetEntry> entries) {
   return table;
 }
 
+TextTable made_up_table(std::span<const DatasetEntry> entries) {
+  std::map<std::string, std::vector<double>> shares;
+  for (const DatasetEntry& entry : entries)
+    for (const auto& [kind, share] : entry.made_up)
+      if (entry.status == ClipStatus::kKept) shares[kind].push_back(share);
+  TextTable table{.header = {"made up", "clips", "of the clips", "frames of these"}, .rows = {}, .label_columns = 1};
+  for (const auto& [kind, of_clips] : shares) {
+    const auto clips = static_cast<double>(of_clips.size());
+    table.rows.push_back({kind, std::to_string(of_clips.size()),
+                          fmt::format("{:.1f} %", 100.0 * clips / static_cast<double>(kept(entries))),
+                          fmt::format("{:.1f} %", 100.0 * std::reduce(of_clips.begin(), of_clips.end()) / clips)});
+  }
+  return table;
+}
+
 TextTable source_table(std::span<const DatasetEntry> entries) {
   std::map<std::string, std::pair<int, std::string>> formats;
   for (const DatasetEntry& entry : entries) {
@@ -368,6 +390,8 @@ void write_derived_files(const std::string& folder, const std::vector<DatasetEnt
   write("tables/outcomes.csv", csv_table(outcome_table(entries)));
   write("tables/refused.csv", csv_table(refused_table(entries)));
   write("tables/retargeting.csv", csv_table(retargeting_table(entries)));
+  if (const TextTable made_up = made_up_table(entries); !made_up.rows.empty())
+    write("tables/made_up.csv", csv_table(made_up));
   write("card.md", dataset_card_markdown(entries, settings));
   write("card.html", dataset_card_html(entries, settings));
   batch.put_in_place();

@@ -28,6 +28,9 @@ TextTable outcome_table(std::span<const DatasetEntry> entries);
 TextTable refused_table(std::span<const DatasetEntry> entries);
 // The 18 metrics, how the robot stands, and the detectors' share per robot: mean over the clips kept that have a value.
 TextTable retargeting_table(std::span<const DatasetEntry> entries);
+// Per kind of what was made up: clips kept that have it, their share of those kept, mean share of their frames. Empty
+// where nothing was.
+TextTable made_up_table(std::span<const DatasetEntry> entries);
 // Per format: clips, licence.
 TextTable source_table(std::span<const DatasetEntry> entries);
 

@@ -62,6 +62,7 @@ const JsonSchema<DatasetEntry>& json_schema<DatasetEntry>() {
       {{"provenance"}, &E::provenance},
       {{"task"}, &E::task},
       {{"reactor"}, &E::reactor},
+      {{.name = "made_up", .optional = true}, &E::made_up},
       {{"frames"}, &E::frames},
       json_group<E>({"act"}, {{finite_key("begin_s"), &E::act_begin}, {finite_key("end_s"), &E::act_end}}),
       {{"statistics"}, &E::statistics},

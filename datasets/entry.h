@@ -42,6 +42,7 @@ struct DatasetEntry {
   std::vector<std::string> evidence = {};  // what was found of unit, axes, rate, floor, ...
   std::map<std::string, std::string> provenance = {};
   std::string task = {}, reactor = {};
+  std::map<std::string, double> made_up = {};   // share of frames by kind ("legs"); motion/people/made_up.h
   int frames = 0;                               // at 50 Hz
   double act_begin = 0.0, act_end = 0.0;        // [s]
   ClipStatistics statistics = {};               // zero seconds: none were made

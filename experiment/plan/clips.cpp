@@ -24,6 +24,7 @@
 #include "duet/experiment/work/run_work.h"
 #include "duet/experiment/work/stop_token.h"
 #include "duet/motion/npz_fields.h"
+#include "duet/motion/people/made_up.h"
 #include "duet/motion/people/tracked_clip.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "duet/retarget/solver/pair.h"
@@ -61,11 +62,13 @@ Tags tags_of(const SyntheticClip& clip) {
   return tags;
 }
 
-// The kind of a file's people, by what its clip says that made it. A paired motion has tags of its own.
+// The kind of a file's people and what was made up of them, by what its clip says. A paired motion has tags of its own.
 void add_people(const Npz& npz, PairedMotion& motion) {
   if (kind_of(npz) != MotionFile::kClip) return;
-  const bool synthetic = is_synthesised(get_texts(npz, "source"));
-  motion.tags.insert_or_assign(std::string(kPeopleTag), synthetic ? kSyntheticPeople : kRecordedPeople);
+  const std::map<std::string, std::string> source = get_texts(npz, "source");
+  motion.tags.insert_or_assign(std::string(kPeopleTag), is_synthesised(source) ? kSyntheticPeople : kRecordedPeople);
+  if (const std::string kinds = made_up_kinds(source); !kinds.empty())
+    motion.tags.insert_or_assign(std::string(kMadeUpTag), kinds);
 }
 
 // The people's, whoever of the two the robot replaces.

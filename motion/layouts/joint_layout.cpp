@@ -161,15 +161,26 @@ const JointLayout& joint_layout(std::string_view name) { return entry_named(layo
 
 std::vector<std::string> joint_layout_names() { return names_of(layouts()); }
 
-JointLayout layout_of_names(std::string name, std::vector<std::string> names) {
-  const BodyColumns columns = body_columns(name, names);
+JointLayout layout_of_names(std::string name, std::vector<std::string> names, Legs legs) {
+  BodyColumns columns = body_columns(name, names);
+  const std::size_t in_file = names.size();
+  if (legs == Legs::kMadeUp && lacks_legs(columns)) {
+    for (const int side : {0, 1})
+      for (const auto& [part, joint] :
+           {std::pair{kHipPart, kLeftHip}, {kKneePart, kLeftKnee}, {kAnklePart, kLeftAnkle}}) {
+        if (columns.side[side][part] >= 0) continue;
+        columns.side[side][part] = static_cast<int>(names.size());
+        names.emplace_back(kSmplNames[side == 0 ? joint : kSmplMirror[joint]]);
+      }
+  }
   JointLayout layout{.name = std::move(name), .names = std::move(names), .smpl = {}};
+  layout.made_up = static_cast<int>(layout.names.size() - in_file);
   layout.smpl = recipes_of(columns, static_cast<int>(layout.names.size()), layout.name);
   layout.face = face_of(columns);
   return layout;
 }
 
-JointLayout read_joint_layout(const std::string& name_or_path, const std::vector<std::string>& own_names) {
+JointLayout read_joint_layout(const std::string& name_or_path, const std::vector<std::string>& own_names, Legs legs) {
   const std::vector<std::string> known = joint_layout_names();
   if (std::find(known.begin(), known.end(), name_or_path) != known.end()) return joint_layout(name_or_path);
   if (!std::filesystem::is_regular_file(name_or_path))
@@ -189,7 +200,7 @@ JointLayout read_joint_layout(const std::string& name_or_path, const std::vector
     for (std::string_view line : split(text, '\n'))
       if (line = trimmed(line.substr(0, line.find('#')), " \t\r,;\""); !line.empty()) names.emplace_back(line);
   }
-  JointLayout layout = layout_of_names(name_or_path, std::move(names));
+  JointLayout layout = layout_of_names(name_or_path, std::move(names), legs);
   layout.has_gaps = true;  // a user's own tracker may lose joints
   return layout;
 }

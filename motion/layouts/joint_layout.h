@@ -19,6 +19,7 @@ struct JointLayout {
   std::vector<JointRecipe::Part> face = {};  // out of the face: nose from the middle of the ears; empty where unknown
   // A tracker that loses joints writes NaN for them: short gaps are filled (clip_of). Elsewhere NaN is a damaged file.
   bool has_gaps = false;
+  int made_up = 0;  // columns at the end of `names` that no file holds: legs that add_legs() makes up
 
   [[nodiscard]] bool has_toes() const { return smpl[kLeftToe].ahead == 0.0; }
 };
@@ -29,14 +30,17 @@ std::vector<std::string> joint_layout_names();
 
 // A skeleton of these columns; names are matched by what they are called elsewhere ("l_wrist", "LeftHand", "WristLeft";
 // a prefix up to ':' is ignored), columns of other names are not used. Throws InputError where the names do not make a
-// person, with the parts that are missing, or where one part is there twice.
-JointLayout layout_of_names(std::string name, std::vector<std::string> names);
+// person, with the parts that are missing, or where one part is there twice. With Legs::kMadeUp those of an upper body
+// (lacks_legs) become columns at the end.
+enum class Legs { kNeeded, kMadeUp };
+JointLayout layout_of_names(std::string name, std::vector<std::string> names, Legs legs = Legs::kNeeded);
 
 // A layout's name, or the path of a text file: of names in the order of the
 // columns, one a line ('#' begins a comment), or of lines "left_hip: NAME"
 // (motion/layouts/joint_recipes.h) for columns that have `own_names`. Throws InputError
 // naming the file, or std::invalid_argument for neither.
-JointLayout read_joint_layout(const std::string& name_or_path, const std::vector<std::string>& own_names = {});
+JointLayout read_joint_layout(const std::string& name_or_path, const std::vector<std::string>& own_names = {},
+                              Legs legs = Legs::kNeeded);
 
 // The 24 joints of one frame whose columns are in metres in W (z up). `offsets` false: without reach, ahead and down,
 // in any unit and axes.

@@ -322,6 +322,13 @@ void require_parts(const BodyColumns& columns, const std::string& skeleton) {
         fmt::format("skeleton '{}': no column is the {}", excerpt(skeleton), fmt::join(missing, "; none the ")));
 }
 
+bool lacks_legs(const BodyColumns& columns) {
+  const auto& [left, right] = columns.side;
+  for (const auto& at : columns.side)
+    if (at[kKneePart] >= 0 || at[kAnklePart] >= 0 || at[kToePart] >= 0) return false;
+  return (left[kHipPart] < 0) == (right[kHipPart] < 0);
+}
+
 BodyColumns body_columns(const std::string& skeleton, const std::vector<std::string>& names) {
   return ColumnFinder(skeleton, names).find();
 }

@@ -72,6 +72,9 @@ BodyColumns body_columns(const std::string& skeleton, const std::vector<std::str
 // Throws InputError listing the parts without which nobody can be made.
 void require_parts(const BodyColumns& columns, const std::string& skeleton);
 
+// Whether no column is of a leg below the hips, and both hips or neither are there.
+bool lacks_legs(const BodyColumns& columns);
+
 // `size`: how many columns. Throws InputError listing the parts that are
 // missing.
 std::array<JointRecipe, kSmplJoints> recipes_of(const BodyColumns& columns, int size, const std::string& skeleton);

@@ -168,8 +168,6 @@ Eigen::Vector3d floor_normal(const SampledPeople& people) {
   return fit.normal();
 }
 
-std::string up_figures(const Eigen::Vector3d& mean) { return "heads are above ankles along " + direction_text(mean); }
-
 }  // namespace
 
 PeopleSamples::PeopleSamples(const RawPeople& people, int first) : people_(people) {
@@ -225,18 +223,22 @@ PeopleFinding<double> find_unit(const RawPeople& people, const SampledPeople& ra
 }
 
 PeopleFinding<Axis> find_up(const RawPeople& people, const SampledPeople& raw, const PeopleOptions& options) {
-  const Eigen::Vector3d mean = mean_upright_of(raw);
-  if (options.up)
-    return {*options.up, fmt::format("up axis: {} (as told; {})", to_string(*options.up), up_figures(mean))};
+  return find_up(people, mean_upright_of(raw), "ankles", options);
+}
+
+PeopleFinding<Axis> find_up(const RawPeople& people, const Eigen::Vector3d& mean, std::string_view parts,
+                            const PeopleOptions& options) {
+  const std::string figures = fmt::format("heads are above {} along {}", parts, direction_text(mean));
+  if (options.up) return {*options.up, fmt::format("up axis: {} (as told; {})", to_string(*options.up), figures)};
   if (people.up)
-    return {*people.up, fmt::format("up axis: {} (as the format has it; {})", to_string(*people.up), up_figures(mean))};
+    return {*people.up, fmt::format("up axis: {} (as the format has it; {})", to_string(*people.up), figures)};
   for (int axis = 0; axis < 3; ++axis)
     if (std::abs(mean[axis]) >= kUprightCosine) {
       const auto up = static_cast<Axis>(2 * axis + (mean[axis] < 0.0 ? 1 : 0));
-      return {up, fmt::format("up axis: {} ({})", to_string(up), up_figures(mean))};
+      return {up, fmt::format("up axis: {} ({})", to_string(up), figures)};
     }
   throw InputError(fmt::format("'{}': cannot tell the up axis: {}, expected near one of the axes; state the up axis",
-                               excerpt(people.name), up_figures(mean)));
+                               excerpt(people.name), figures));
 }
 
 Eigen::Matrix3d rotation_of(Axis up) {

@@ -47,6 +47,9 @@ PeopleFinding<double> find_unit(const RawPeople& people, const SampledPeople& ra
 
 // From the mean direction head above ankles, with its sign.
 PeopleFinding<Axis> find_up(const RawPeople& people, const SampledPeople& raw, const PeopleOptions& options);
+// From the mean direction head above `parts` ("ankles").
+PeopleFinding<Axis> find_up(const RawPeople& people, const Eigen::Vector3d& mean, std::string_view parts,
+                            const PeopleOptions& options);
 
 // The rotation that takes an axis to z.
 Eigen::Matrix3d rotation_of(Axis up);

@@ -38,9 +38,11 @@ struct PeopleOptions {
   std::string body_model = {};           // the user's SMPL, SMPL-H or SMPL-X file
   std::string object = {};               // the user's file of a carried object's shape (motion/carried_object.h)
   Alignment align = Alignment::kNone;
-  std::optional<Task> task = {};       // empty: from the file's or folder's label, else refused
-  std::optional<Person> reactor = {};  // empty: from the data set's annotation, else B
-  bool as_is = false;                  // take people who cannot be (size, upright, floor, sides), and say so
+  std::optional<Task> task = {};         // empty: from the file's or folder's label, else refused
+  std::optional<Person> reactor = {};    // empty: from the data set's annotation, else B
+  std::optional<double> fill_gaps = {};  // of a joint that is not seen, at most; also at either end [s]
+  bool still_partner = false;            // somebody who stands still faces one who is alone in a file
+  bool as_is = false;                    // take people who cannot be (size, upright, floor, sides), and say so
   double output_rate_hz = 50.0;
 };
 
@@ -48,11 +50,13 @@ struct RawPeople {
   std::string id;                       // of the clip: file name, or the data set's own
   std::string name;                     // the file, for messages
   const JointLayout* layout = nullptr;  // which joint each column is
-  std::array<PointTracks, 2> joints;    // (T, layout->names.size(), 3) in the file's axes and unit
+  // (T, layout->names.size() - layout->made_up, 3) in the file's axes and unit; person B's is empty of one alone.
+  std::array<PointTracks, 2> joints;
   // R_FJ, T * 24 in SMPL order: global, the identity in SMPL's rest pose (x to the left, y up, z forward); empty where
   // unknown.
   std::array<std::vector<Eigen::Quaterniond>, 2> rotations = {};
   double rate_hz = 0.0;         // 0: the file does not say
+  bool uneven = false;          // the file's times are not: its frames were put at even ones along lines
   std::optional<Axis> up = {};  // what the format is known to have; its world is level then
   std::optional<double> metres_per_unit = {};
   std::optional<Task> task = {};  // from the file's or folder's label

@@ -11,6 +11,7 @@
 #include "duet/core/require.h"
 #include "duet/motion/carried_object.h"
 #include "duet/motion/interaction_clip.h"
+#include "duet/motion/people/made_up.h"
 #include "duet/motion/people/people_detection.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/plausibility.h"
@@ -28,14 +29,14 @@ constexpr double kTPoseJump = 5.0,
   throw InputError(fmt::format("'{}': {}", excerpt(people.name, kShownSentence), fault));
 }
 
-void check_sizes(const RawPeople& people) {
+void check_sizes(const RawPeople& people, bool alone) {
   require(people.layout != nullptr, "people without a joint layout");
-  const auto columns = static_cast<int>(people.layout->names.size());
+  const int columns = static_cast<int>(people.layout->names.size()) - people.layout->made_up;
   for (const PointTracks& joints : people.joints)
-    if (joints.points() != columns)
+    if (joints.points() != columns && !(alone && joints.empty()))
       refuse(people, fmt::format("expected the {} joints of '{}', found {}", columns, excerpt(people.layout->name),
                                  joints.points()));
-  const int a = people.joints[0].frames(), b = people.joints[1].frames();
+  const int a = people.joints[0].frames(), b = alone ? a : people.joints[1].frames();
   if (a != b) refuse(people, fmt::format("person A has {} frames and person B {}: expected the same", a, b));
   if (a < 2) refuse(people, fmt::format("expected at least 2 frames, found {}", a));
   for (const auto& rotations : people.rotations)
@@ -257,26 +258,59 @@ void judge(const RawPeople& people, const InteractionClip& clip, const PeopleOpt
 
 }  // namespace
 
+namespace {
+
+// In place: gaps filled, a place for the partner of one alone, legs. What was made up is said and counted.
+MadeUp make_up(RawPeople& people, bool alone, const PeopleOptions& options, std::vector<std::string>& evidence) {
+  MadeUp made;
+  if (const FilledGaps gaps = fill_gaps(people, options); gaps.gaps > 0) {
+    evidence.push_back(gaps.sentence());
+    made["gaps"] = static_cast<double>(std::ranges::count(gaps.frames, true)) / static_cast<double>(gaps.frames.size());
+  }
+  if (alone) people.joints[1] = people.joints[0];  // world and rate are found with him
+  if (people.layout->made_up > 0) {
+    evidence.push_back(add_legs(people, options));
+    made["legs"] = 1.0;
+  }
+  return made;
+}
+
+// Where frames lie far apart, or at other times than the file's.
+void count_rate(const RawPeople& people, const Plan& plan, MadeUp& made, std::vector<std::string>& evidence) {
+  if (plan.rate_hz >= kLowRate && !people.uneven) return;
+  made["rate"] = std::max(0.0, 1.0 - plan.rate_hz / plan.output_rate_hz);
+  evidence.push_back(fmt::format("rate: {:.0f} % of the frames lie between recorded ones{}", 100.0 * made["rate"],
+                                 people.uneven ? ", whose times are uneven" : ""));
+}
+
+}  // namespace
+
 SourceClip clip_of(const RawPeople& given, const PeopleOptions& options) {
-  check_sizes(given);
+  RawPeople people = given;
+  const bool alone = options.still_partner && people.joints[1].empty();
+  check_sizes(people, alone);
   SourceClip result;
-  result.evidence = given.evidence;
-  const Task task = task_for(given, options);
-  if (const auto label = given.source.find("label");
-      label != given.source.end() && task_of_label(label->second) != task)
+  result.evidence = people.evidence;
+  const Task task = task_for(people, options);
+  if (const auto label = people.source.find("label");
+      label != people.source.end() && task_of_label(label->second) != task)
     result.evidence.push_back(
         fmt::format("task: {} (as told; its label is '{}')", to_string(task), excerpt(label->second)));
-  std::optional<RawPeople> filled;
-  if (const std::string sentence = fill_gaps(given, options.rate_hz.value_or(given.rate_hz), filled); !sentence.empty())
-    result.evidence.push_back(sentence);
-  const RawPeople& people = filled ? *filled : given;
+  MadeUp made = make_up(people, alone, options, result.evidence);
   try {
     const Plan plan = plan_of(people, options, result.evidence);
+    count_rate(people, plan, made, result.evidence);
     InteractionClip& clip = result.clip;
     clip.id = people.id;
     clip.task = task;
     clip.a = motion_of(people, 0, plan);
-    clip.b = motion_of(people, 1, plan);
+    clip.b = alone ? still_partner(clip.a, task) : motion_of(people, 1, plan);
+    if (alone) {
+      made["partner"] = 1.0;
+      result.evidence.push_back(
+          fmt::format("partner: made up, stands still {:.2f} m in front",
+                      (clip.a.joints.at(0, kPelvis) - clip.b.joints.at(0, kPelvis)).head<2>().norm()));
+    }
     if (plan.mirrored && !people.rotations[0].empty())
       result.evidence.emplace_back("rotations: left out, since the world is reflected");
     clip.phases = {.act_begin = 0, .act_end = plan.frames};
@@ -285,10 +319,12 @@ SourceClip clip_of(const RawPeople& given, const PeopleOptions& options) {
     clip.phases = phases_of(people, plan, clip, sentence);
     result.evidence.push_back(sentence);
     clip.source = provenance(people, plan);
-    if (filled) clip.source["interpolated"] = "true";
+    if (made.contains("gaps")) clip.source["interpolated"] = "true";
+    put_made_up(made, clip.source);
     clip.object = object_of(people, options, plan, result.evidence);
     judge(people, clip, options, result.evidence);
-    set_reactor(clip, options.reactor.value_or(people.reactor.value_or(Person::kB)));
+    // The one who has the initiative is the robot's where nobody else acts.
+    set_reactor(clip, options.reactor.value_or(people.reactor.value_or(alone ? Person::kA : Person::kB)));
   } catch (const std::invalid_argument& error) {
     refuse(people, error.what());
   }
@@ -308,19 +344,18 @@ bool all_finite(const PointTracks& joints) {
   return others == 0;
 }
 
-// Frames [begin, end) between two that are seen.
+// Frames [begin, end), of which one at least beside them is seen.
 void fill(PointTracks& joints, int joint, int begin, int end) {
-  const Eigen::Vector3d before = joints.at(begin - 1, joint), after = joints.at(end, joint);
+  const Eigen::Vector3d before = joints.at(begin > 0 ? begin - 1 : end, joint),
+                        after = joints.at(end < joints.frames() ? end : begin - 1, joint);
   for (int t = begin; t < end; ++t)
     joints.at(t, joint) = before + (after - before) * (t - begin + 1.0) / (end - begin + 1.0);
 }
 
-struct Filled {
-  int gaps = 0, values = 0, longest = 0;  // [frames]
-};
-
-void fill_joint(const RawPeople& people, int who, int joint, double rate_hz, PointTracks& joints, Filled& count) {
+void fill_joint(RawPeople& people, int who, int joint, const PeopleOptions& options, FilledGaps& count) {
+  PointTracks& joints = people.joints[who];
   const int frames = joints.frames();
+  const double rate_hz = options.rate_hz.value_or(people.rate_hz), longest = options.fill_gaps.value_or(kLongestUnseen);
   const auto seen = [&](int t) { return joints.at(t, joint).allFinite(); };
   for (int t = 0; t < frames; ++t) {
     if (seen(t)) continue;
@@ -328,15 +363,22 @@ void fill_joint(const RawPeople& people, int who, int joint, double rate_hz, Poi
     if (!people.layout->has_gaps) refuse_gap(people, who, t, joint, "the position is not a number");
     int end = t;
     while (end < frames && !seen(end)) ++end;
-    if (t == 0 || end == frames)
-      refuse_gap(people, who, t, joint, fmt::format("not seen at the {} of the recording", t == 0 ? "begin" : "end"));
-    if (!(rate_hz > 0.0) || end - t > kLongestUnseen * rate_hz)
+    const bool at_end = t == 0 || end == frames;
+    if (t == 0 && end == frames) refuse_gap(people, who, t, joint, "not seen in any frame");
+    if (at_end && !options.fill_gaps)
       refuse_gap(people, who, t, joint,
-                 fmt::format("not seen for {} frames, expected at most {} s", end - t, kLongestUnseen));
+                 fmt::format("not seen at the {} of the recording (--fill-gaps SECONDS holds the nearest position)",
+                             t == 0 ? "begin" : "end"));
+    if (!(rate_hz > 0.0) || end - t > longest * rate_hz)
+      refuse_gap(people, who, t, joint,
+                 fmt::format("not seen for {} frames, expected at most {} s (--fill-gaps SECONDS fills longer ones)",
+                             end - t, longest));
     fill(joints, joint, t, end);
     ++count.gaps;
     count.values += end - t;
     count.longest = std::max(count.longest, end - t);
+    count.held = count.held || at_end;
+    std::fill(count.frames.begin() + t, count.frames.begin() + end, true);
     t = end;
   }
 }
@@ -355,18 +397,23 @@ std::vector<bool> used_columns(const JointLayout& layout) {
 
 }  // namespace
 
-std::string fill_gaps(const RawPeople& people, double rate_hz, std::optional<RawPeople>& filled) {
-  if (all_finite(people.joints[0]) && all_finite(people.joints[1])) return "";
-  RawPeople copy = people;
-  Filled count;
+std::string FilledGaps::sentence() const {
+  return fmt::format(
+      "gaps: {} stretches of a joint not seen, {} positions, the longest {} frames, filled along lines{}", gaps, values,
+      longest, held ? ", at the ends with the nearest position" : "");
+}
+
+FilledGaps fill_gaps(RawPeople& people, const PeopleOptions& options) {
+  require(!options.fill_gaps || (std::isfinite(*options.fill_gaps) && *options.fill_gaps >= 0.0),
+          "--fill-gaps: expected seconds, 0 or more, found {}", options.fill_gaps.value_or(0.0));
+  FilledGaps count;
+  if (all_finite(people.joints[0]) && all_finite(people.joints[1])) return count;
+  count.frames.resize(static_cast<std::size_t>(people.joints[0].frames()));
   const std::vector<bool> used = used_columns(*people.layout);
   for (const int who : {0, 1})
     for (int joint = 0; joint < people.joints[who].points(); ++joint)
-      if (used[joint]) fill_joint(people, who, joint, rate_hz, copy.joints[who], count);
-  if (count.gaps == 0) return "";
-  filled = std::move(copy);
-  return fmt::format("gaps: {} stretches of a joint not seen, {} positions, the longest {} frames, filled along lines",
-                     count.gaps, count.values, count.longest);
+      if (used[joint]) fill_joint(people, who, joint, options, count);
+  return count;
 }
 
 }  // namespace duet

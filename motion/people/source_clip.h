@@ -22,13 +22,20 @@ struct SourceClip {
 SourceClip clip_of(const RawPeople& people, const PeopleOptions& options = {});
 
 // Joints that a tracker did not see in some frames (NaN): short gaps are filled along straight lines, longer ones are
-// refused.
+// refused. Where PeopleOptions::fill_gaps is told, gaps up to that length are filled, those at either end with the
+// nearest position that is seen.
 
 inline constexpr double kLongestUnseen = 0.25;  // of a joint that is not seen [s]
 
-// A sentence where gaps were filled, with `filled` the people then; "" and nothing where all values are finite. Throws
-// InputError naming person, frame and joint: a value that is not finite where the layout has no gaps, at either end of
-// the recording, or for longer than kLongestUnseen; an infinite one anywhere.
-std::string fill_gaps(const RawPeople& people, double rate_hz, std::optional<RawPeople>& filled);
+// The gaps that were filled; none where all values are finite.
+struct FilledGaps {
+  int gaps = 0, values = 0, longest = 0;  // [frames]
+  std::vector<bool> frames = {};          // of either person
+  bool held = false;                      // some at an end
+  [[nodiscard]] std::string sentence() const;
+};
+// In place. Throws InputError naming person, frame and joint: a value that is not finite where the layout has no gaps,
+// at an end where fill_gaps is not told, or for longer than it (default: kLongestUnseen); an infinite one anywhere.
+FilledGaps fill_gaps(RawPeople& people, const PeopleOptions& options);
 
 }  // namespace duet

@@ -68,6 +68,9 @@ void add_people_options(CLI::App& command, PeopleArguments& arguments) {
       "--skeleton", options.skeleton,
       "which joint each column is: `duet list joint-layouts`, a file with one name a line, or one of lines "
       "'left_hip: NAME' (of BVH files, too)");
+  number("--fill-gaps", options.fill_gaps, "fill gaps of a joint up to this long, also at the ends [s]");
+  command.add_flag("--still-partner", options.still_partner,
+                   "files hold one person each: somebody who stands still is put in front of each");
   command.add_flag("--as-is", options.as_is, "take clips however implausible their people are");
   command.add_option("--body-model", options.body_model, "your SMPL, SMPL-H or SMPL-X file (NPZ or PKL)");
   command.add_option("--object", options.object,

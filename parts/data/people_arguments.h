@@ -16,7 +16,7 @@ struct PeopleArguments {
 };
 
 // --format, --task, --robot, --units, --up, --rate, --mirror, --level, --floor, --drop-t-pose, --skeleton,
-// --body-model, --object, --align, each with its opposite where it has one.
+// --fill-gaps, --still-partner, --body-model, --object, --align, each with its opposite where it has one.
 void add_people_options(CLI::App& command, PeopleArguments& arguments);
 
 // Throws std::invalid_argument for a value that is none of the option's.

@@ -14,6 +14,7 @@
 #include "duet/archives/pickle/pickle_machine.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/motion/people/made_up.h"
 #include "duet/people/bodies/number_table.h"
 #include "duet/tasks/synthesis/posed_body.h"
 
@@ -21,7 +22,6 @@ namespace duet {
 namespace {
 
 constexpr std::size_t kShapes = 10;
-constexpr double kAverageStature = 1.70;                   // [m]
 constexpr double kSmallestSpan = 0.5, kLargestSpan = 3.0;  // of all rest joints, largest extent [m]
 constexpr std::string_view kCacheSuffix = ".duet-joints.npz";
 

@@ -16,7 +16,8 @@
 namespace duet {
 namespace {
 
-constexpr double kEvenTimes = 0.1;  // of a period
+constexpr double kEvenTimes = 0.1;   // of a period
+constexpr double kMostFrames = 2.0;  // at even times, of those in the file
 
 [[noreturn]] void refuse_csv(const std::string& name, const std::string& fault) {
   throw InputError(fmt::format("'{}': {}", excerpt(name, kShownSentence), fault));
@@ -151,19 +152,45 @@ double number_of(const CsvReader& row, std::size_t column) {
   return *value;
 }
 
-double rate_of_times(const std::vector<double>& times, const std::string& name) {
-  if (times.size() < 2) return 0.0;
+// The rate, and whether the steps are all alike.
+std::pair<double, bool> rate_of_times(const std::vector<double>& times, const std::string& name,
+                                      std::optional<double> longest_step) {
+  if (times.size() < 2) return {0.0, true};
   std::vector<double> steps;
   for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
   const double period = quantile(steps, 0.5);
   if (!(period > 0.0)) refuse_csv(name, "column 'time': expected times that grow");
-  for (std::size_t i = 0; i < steps.size(); ++i)
-    if (!(std::abs(steps[i] - period) <= kEvenTimes * period))
-      refuse_csv(name, fmt::format("column 'time': frame {} comes after {:.4g} s, expected {:.4g} s", i + 1, steps[i],
-                                   period));
-  const double mean = static_cast<double>(steps.size()) / (times.back() - times.front());
+  bool even = true;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (std::abs(steps[i] - period) <= kEvenTimes * period) continue;
+    even = false;
+    if (!longest_step || !(steps[i] > 0.0 && steps[i] <= *longest_step))
+      refuse_csv(name, fmt::format("column 'time': frame {} comes after {:.4g} s, expected {:.4g} s{}", i + 1, steps[i],
+                                   period,
+                                   longest_step ? fmt::format(", at most {} s", *longest_step)
+                                                : " (--fill-gaps SECONDS puts uneven times in order)"));
+  }
+  if (const double frames = (times.back() - times.front()) / period;
+      frames > kMostFrames * static_cast<double>(times.size()))
+    refuse_csv(name, fmt::format("column 'time': {} frames in {:.4g} s, expected {:.0f}, one every {:.4g} s",
+                                 times.size(), times.back() - times.front(), frames, period));
+  const double mean = even ? static_cast<double>(steps.size()) / (times.back() - times.front()) : 1.0 / period;
   const double whole = std::round(mean);
-  return whole > 0.0 && std::abs(mean - whole) <= 2e-3 * whole ? whole : mean;
+  return {whole > 0.0 && std::abs(mean - whole) <= 2e-3 * whole ? whole : mean, even};
+}
+
+// At even times from the first on, along lines.
+PointTracks at_even_times(const PointTracks& tracks, const std::vector<double>& times, double rate_hz) {
+  PointTracks even(static_cast<int>(std::floor((times.back() - times.front()) * rate_hz + 1e-6)) + 1, tracks.points());
+  int before = 0;
+  for (int t = 0; t < even.frames(); ++t) {
+    const double time = times.front() + t / rate_hz;
+    while (before + 2 < tracks.frames() && times[static_cast<std::size_t>(before) + 1] <= time) ++before;
+    const auto at = static_cast<std::size_t>(before);
+    const double part = std::clamp((time - times[at]) / (times[at + 1] - times[at]), 0.0, 1.0);
+    even.frame(t) = (1.0 - part) * tracks.frame(before) + part * tracks.frame(before + 1);
+  }
+  return even;
 }
 
 }  // namespace
@@ -186,7 +213,7 @@ bool csv_has_two_people(std::string_view text, const std::string& name) {
   return header_of(rows).two_people;
 }
 
-PositionsCsv parse_positions_csv(std::string_view text, const std::string& name) {
+PositionsCsv parse_positions_csv(std::string_view text, const std::string& name, std::optional<double> longest_step) {
   CsvReader rows(text, name);
   if (!rows.next()) refuse_csv(name, "expected a line of names, found none");
   const CsvHeader header = header_of(rows);
@@ -216,7 +243,11 @@ PositionsCsv parse_positions_csv(std::string_view text, const std::string& name)
           tracks.at(static_cast<int>(t), static_cast<int>(j))[axis] = values[t * width + column];
       }
   }
-  result.rate_hz = rate_of_times(times, name);
+  const auto [rate_hz, even] = rate_of_times(times, name, longest_step);
+  result.rate_hz = rate_hz;
+  result.uneven = !even;
+  for (PointTracks& tracks : result.tracks)
+    if (!even && !tracks.empty()) tracks = at_even_times(tracks, times, rate_hz);
   return result;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,12 +17,15 @@ struct PositionsCsv {
   bool two_people = false;
   std::array<PointTracks, 2> tracks;  // the second empty where there is one person
   double rate_hz = 0.0;               // of a column "time" in seconds; 0 without one
+  bool uneven = false;                // the times are not even: the tracks are, along lines between the file's frames
 };
 
 // An empty field and "nan" are NaN. Throws InputError naming file, line and column: no names, an axis that is missing,
 // a joint that is there twice or for one person only, a field that is no number, lines of different length, times that
-// do not go on evenly (to a tenth of a period).
-PositionsCsv parse_positions_csv(std::string_view text, const std::string& name);
+// do not go on evenly (to a tenth of a period) or, where `longest_step` [s] is told, a step that is longer, and more
+// than half of the frames missing.
+PositionsCsv parse_positions_csv(std::string_view text, const std::string& name,
+                                 std::optional<double> longest_step = std::nullopt);
 
 // Whether the table begins with names of which half or more are joints' axes: it is of people, whatever is wrong with
 // it further down. `text`: the file or its beginning. Throws nothing.

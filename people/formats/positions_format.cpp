@@ -129,7 +129,7 @@ std::string partner_of(const std::string& file, const std::vector<std::string>& 
   return "";
 }
 
-std::vector<ClipPlace> find_positions(std::span<const std::string> paths, const PeopleOptions& /*options*/) {
+std::vector<ClipPlace> find_positions(std::span<const std::string> paths, const PeopleOptions& options) {
   std::vector<std::string> files;
   for (const std::string& path : paths) {
     if (is_file(path)) files.push_back(path);
@@ -139,7 +139,7 @@ std::vector<ClipPlace> find_positions(std::span<const std::string> paths, const 
   std::vector<ClipPlace> places;
   std::vector<std::string> single;
   for (const std::string& file : files) {
-    if (holds_both(file))
+    if (holds_both(file) || options.still_partner)
       places.push_back({.id = id_of(stem_of(file), 1), .files = {file}, .entry = {}});
     else
       single.push_back(file);
@@ -162,12 +162,28 @@ std::vector<ClipPlace> find_positions(std::span<const std::string> paths, const 
 
 // ---- what the files hold -------------------------------------------------------------------------------------------
 
-// Both people of an array (T, 2, J, 3 or 4) or (2, T, J, 3 or 4).
-void split_people(NpyArray array, const std::string& what, RawPeople& people) {
+constexpr std::string_view kStillPartner = "--still-partner lets somebody stand still in front";
+
+PointTracks one_person(NpyArray array, const std::string& what) {
+  if (array.shape.size() != 3 || array.shape[2] < 3 || array.shape[2] > 4)
+    throw InputError(fmt::format("{}: expected shape (T, J, 3), found {}", what, shape_text(array.shape)));
+  const auto points = static_cast<int>(array.shape[1]);
+  return tracks_of(std::move(array), points, what);
+}
+
+// Both people of an array (T, 2, J, 3 or 4) or (2, T, J, 3 or 4); with a partner who stands still one's, (T, J, 3 or
+// 4).
+void split_people(NpyArray array, const std::string& what, const PeopleOptions& options, RawPeople& people) {
   const std::vector<std::size_t> shape = array.shape;
+  const bool alone = shape.size() == 3 && (shape[2] == 3 || shape[2] == 4);
+  if (alone && options.still_partner) {
+    people.joints[0] = one_person(std::move(array), what);
+    return;
+  }
   const bool fits = shape.size() == 4 && (shape[3] == 3 || shape[3] == 4) && (shape[0] == 2 || shape[1] == 2);
   if (!fits)
-    throw InputError(fmt::format("{}: expected shape (T, 2, J, 3) or (2, T, J, 3), found {}", what, shape_text(shape)));
+    throw InputError(fmt::format("{}: expected shape (T, 2, J, 3) or (2, T, J, 3), found {}{}", what, shape_text(shape),
+                                 alone ? fmt::format(", one person ({})", kStillPartner) : ""));
   const bool people_first = shape[1] != 2;
   const std::size_t frames = people_first ? shape[1] : shape[0], points = shape[2], width = shape[3];
   people.evidence.push_back(fmt::format("array: {} of shape {}, {}", what, shape_text(shape),
@@ -184,19 +200,12 @@ void split_people(NpyArray array, const std::string& what, RawPeople& people) {
   }
 }
 
-PointTracks one_person(NpyArray array, const std::string& what) {
-  if (array.shape.size() != 3 || array.shape[2] < 3 || array.shape[2] > 4)
-    throw InputError(fmt::format("{}: expected shape (T, J, 3), found {}", what, shape_text(array.shape)));
-  const auto points = static_cast<int>(array.shape[1]);
-  return tracks_of(std::move(array), points, what);
-}
-
 std::string what_of(const std::string& file, const std::string& key) {
   return fmt::format("'{}': array '{}'", excerpt(file, kShownSentence), key);
 }
 
 // The names of the columns where the file has them.
-Keys take_npz(const std::string& path, RawPeople& people) {
+Keys take_npz(const std::string& path, const PeopleOptions& options, RawPeople& people) {
   Keys wanted = both_keys();
   for (const auto& [a, b] : each_keys()) wanted.insert(wanted.end(), {a, b});
   for (const Keys* keys : {&kNameKeys, &kRateKeys, &kLabelKeys, &kUpKeys})
@@ -207,7 +216,7 @@ Keys take_npz(const std::string& path, RawPeople& people) {
   };
   for (const std::string& key : both_keys())
     if (people.joints[0].empty() && npz.contains(key) && !is_text(key))
-      split_people(npz.array(key), what_of(path, key), people);
+      split_people(npz.array(key), what_of(path, key), options, people);
   for (const auto& [a, b] : each_keys())
     if (people.joints[0].empty() && npz.contains(a) && npz.contains(b))
       people.joints = {one_person(npz.array(a), what_of(path, a)), one_person(npz.array(b), what_of(path, b))};
@@ -225,17 +234,22 @@ Keys take_npz(const std::string& path, RawPeople& people) {
   return {};
 }
 
-Keys take_csv(const ClipPlace& place, RawPeople& people) {
-  PositionsCsv first = parse_positions_csv(read_plain_text(place.files[0]), place.files[0]);
+Keys take_csv(const ClipPlace& place, const PeopleOptions& options, RawPeople& people) {
+  const auto parsed = [&](const std::string& file) {
+    PositionsCsv csv = parse_positions_csv(read_plain_text(file), file, options.fill_gaps);
+    people.uneven = people.uneven || csv.uneven;
+    return csv;
+  };
+  PositionsCsv first = parsed(place.files[0]);
   people.rate_hz = first.rate_hz;
   if (place.files.size() == 1) {
-    if (!first.two_people)
-      throw InputError(
-          fmt::format("'{}': expected two people (columns a_... and b_...), found one", excerpt(place.files[0])));
+    if (!first.two_people && !options.still_partner)
+      throw InputError(fmt::format("'{}': expected two people (columns a_... and b_...), found one ({})",
+                                   excerpt(place.files[0]), kStillPartner));
     people.joints = std::move(first.tracks);
     return first.joints;
   }
-  PositionsCsv second = parse_positions_csv(read_plain_text(place.files[1]), place.files[1]);
+  PositionsCsv second = parsed(place.files[1]);
   if (second.joints != first.joints)
     throw InputError(fmt::format("'{}': expected the joints of '{}', found others", excerpt(place.files[1]),
                                  excerpt(place.files[0])));
@@ -246,9 +260,10 @@ Keys take_csv(const ClipPlace& place, RawPeople& people) {
   return first.joints;
 }
 
-void take_npy(const ClipPlace& place, RawPeople& people) {
+void take_npy(const ClipPlace& place, const PeopleOptions& options, RawPeople& people) {
   if (place.files.size() == 1)
-    return split_people(read_npy(place.files[0]), fmt::format("'{}'", excerpt(place.files[0], kShownSentence)), people);
+    return split_people(read_npy(place.files[0]), fmt::format("'{}'", excerpt(place.files[0], kShownSentence)), options,
+                        people);
   for (const std::size_t who : {0U, 1U})
     people.joints[who] =
         one_person(read_npy(place.files[who]), fmt::format("'{}'", excerpt(place.files[who], kShownSentence)));
@@ -261,7 +276,7 @@ JointLayout layout_for(const Keys& names, int columns, const std::string& file, 
                        std::string& sentence) {
   if (!options.skeleton.empty()) {
     sentence = fmt::format("skeleton: {} (as told)", options.skeleton);
-    return read_joint_layout(options.skeleton, names);
+    return read_joint_layout(options.skeleton, names, Legs::kMadeUp);
   }
   const std::vector<std::string> known = joint_layout_names();
   if (!names.empty()) {
@@ -271,7 +286,7 @@ JointLayout layout_for(const Keys& names, int columns, const std::string& file, 
         return joint_layout(name);
       }
     sentence = fmt::format("skeleton: {} joints of the file's own names", names.size());
-    JointLayout layout = layout_of_names("of the file", names);
+    JointLayout layout = layout_of_names("of the file", names, Legs::kMadeUp);
     layout.has_gaps = true;
     return layout;
   }
@@ -296,11 +311,11 @@ RawPeople read_positions(const ClipPlace& place, const PeopleOptions& options) {
   const std::string extension = extension_of(file);
   Keys names;
   if (extension == ".npz")
-    names = take_npz(file, people);
+    names = take_npz(file, options, people);
   else if (is_table(extension))
-    names = take_csv(place, people);
+    names = take_csv(place, options, people);
   else
-    take_npy(place, people);
+    take_npy(place, options, people);
   std::string sentence;
   people.made =
       std::make_shared<const JointLayout>(layout_for(names, people.joints[0].points(), file, options, sentence));

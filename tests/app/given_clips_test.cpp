@@ -107,6 +107,16 @@ TEST_F(GivenClips, SyntheticOnesBesideThemAreCroppedAndPaddedAsTheyAre) {
   EXPECT_NE(seen.source_partner.joints, cropped.source_partner.joints);
 }
 
+TEST_F(GivenClips, WhatWasMadeUpOfAClipIsATag) {
+  const std::string whole = recording("whole"), legless = recording("legless");
+  InteractionClip clip = load_clip(legless);
+  clip.source = {{"made_up.legs", "1"}, {"made_up.gaps", "0.2"}};
+  save_clip(clip, legless);
+  const std::vector<PairedMotion> clips = prepared(suite_of("{files: [" + whole + ", " + legless + "]}"));
+  EXPECT_FALSE(clips[0].tags.contains(kMadeUpTag));
+  EXPECT_EQ(clips[1].tags.at("clip.made_up"), "gaps+legs");
+}
+
 TEST_F(GivenClips, BothRolesAreTwoClips) {
   const std::string files = "{files: [" + recording("one") + "]";
   const std::vector<PairedMotion> both =

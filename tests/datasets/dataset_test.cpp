@@ -1,5 +1,6 @@
 #include "duet/datasets/dataset.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -337,6 +338,57 @@ TEST(DatasetCard, SaysHowManyClipsHaveAnEstimatedSharedFrame) {
   EXPECT_EQ(dataset_card_markdown(entries, nlohmann::json::object()).find(words), std::string::npos);
   entries[1].provenance["provenance"] = "estimated shared frame";
   EXPECT_THAT(dataset_card_markdown(entries, nlohmann::json::object()), HasSubstr(words));
+}
+
+TEST_F(Dataset, WhatWasMadeUpIsInEntryManifestAndCard) {
+  DatasetPlan people = plan();
+  people.robots.clear();
+  people.curation.gates.clear();
+  make_dataset(people, out("whole"));
+  EXPECT_THAT(read_file(out("whole") + "/manifest.json"), ::testing::Not(HasSubstr("made_up")));
+  EXPECT_THAT(read_file(out("whole") + "/card.md"), ::testing::Not(HasSubstr("Made up")));
+  EXPECT_FALSE(fs::exists(out("whole") + "/tables/made_up.csv"));
+
+  std::string csv = "time,head_x,head_y,head_z";
+  const std::vector<std::pair<std::string, SmplJoint>> joints = {{"neck", kNeck},
+                                                                 {"left_shoulder", kLeftShoulder},
+                                                                 {"right_shoulder", kRightShoulder},
+                                                                 {"left_elbow", kLeftElbow},
+                                                                 {"right_elbow", kRightElbow},
+                                                                 {"left_hand", kLeftHand},
+                                                                 {"right_hand", kRightHand}};
+  for (const auto& [name, joint] : joints) csv += fmt::format(",{0}_x,{0}_y,{0}_z", name);
+  const InteractionClip wave = synthesize(Task::kWave, {.seed = 3});
+  for (int t = 0; t < wave.frames(); t += 7) {
+    const auto put = [&](SmplJoint joint) {
+      const Eigen::Vector3d p = wave.a.joints.at(t, joint);
+      csv += fmt::format(",{:.4f},{:.4f},{:.4f}", p.x(), p.y(), p.z());
+    };
+    csv += fmt::format("\n{:.4f}", t / 50.0);
+    put(kHead);
+    for (const auto& [name, joint] : joints) put(joint);
+  }
+  write_file(folder_ / "alone/w1.csv", csv);
+  write_file(folder_ / "alone/w2.csv", csv);
+  people.inputs = {folder_ / "alone"};
+  people.people.still_partner = true;
+  people.people.task = Task::kWave;
+  people.people.fill_gaps = 0.5;
+  make_dataset(people, out());
+  const DatasetEntry entry = by_clip(out()).at("w1");
+  EXPECT_EQ(entry.status, ClipStatus::kKept) << ::testing::PrintToString(entry.reasons);
+  EXPECT_THAT(entry.made_up, ElementsAre(::testing::Pair("legs", 1.0), ::testing::Pair("partner", 1.0),
+                                         ::testing::Pair("rate", ::testing::DoubleNear(0.857, 1e-3))));
+  EXPECT_EQ(entry.reactor, "A");
+  EXPECT_FALSE(entry.provenance.contains("made_up.legs"));
+  EXPECT_EQ(parse_entry(entry_line(entry), "entry").made_up, entry.made_up);
+  const auto manifest = nlohmann::json::parse(read_file(out() + "/manifest.json"));
+  EXPECT_EQ(manifest[0]["made_up"]["legs"], 1.0);
+  EXPECT_THAT(made_up_table(read_dataset(out())).rows, ElementsAre(ElementsAre("legs", "2", "100.0 %", "100.0 %"),
+                                                                   ElementsAre("partner", "2", "100.0 %", "100.0 %"),
+                                                                   ElementsAre("rate", "2", "100.0 %", "85.7 %")));
+  EXPECT_THAT(read_file(out() + "/card.md"), HasSubstr("## Made up"));
+  EXPECT_TRUE(fs::exists(out() + "/tables/made_up.csv"));
 }
 
 TEST_F(Dataset, PeopleAloneNeedNoRobot) {

@@ -102,6 +102,8 @@ void read_people(const test::Standin& standin, std::size_t file, std::string_vie
   options.task = Task::kHug;
   options.rate_hz = 60.0;
   if (standin.name == "npy") options.skeleton = "kinect-25";
+  if (standin.name == "csv") options.fill_gaps = 0.5;
+  if (standin.name == "kinect") options.still_partner = true;
   const PeopleFormat& format = find_people_format(paths, standin.format);
   for (const ClipPlace& place : format.find(paths, options))
     (void)clip_bytes(read_source_clip(format, place, options).clip);

@@ -1,4 +1,5 @@
 // Files that the readers of people refuse: each with one sentence that names the file and the place.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -20,6 +21,8 @@ using test::Standin;
 using test::thrown_message;
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
+
+const std::string kNothing = "(nothing was thrown)";
 
 PeopleOptions with_all() {
   PeopleOptions options;
@@ -244,6 +247,54 @@ TEST(PeopleBadInput, CsvIsJudgedByLineAndColumn) {
     std::string& text = both.files[0].bytes;
     text.replace(text.find("b_nose_x"), 8, "b_chin_x");
   }));
+}
+
+InteractionClip seven_hertz() {
+  InteractionClip clip = test::standin_clip(105, 50.0, Task::kWave);
+  for (HumanMotion* person : {&clip.a, &clip.b}) *person = resample(*person, 7.0);
+  return clip;
+}
+
+// Frames at 6 to 8 Hz, as a camera gives them.
+std::string uneven_csv(double longest_step) {
+  const RawPeople people = test::standin_people(seven_hertz(), joint_layout("kinect-20"));
+  std::string text = test::csv_of(people, {0, 1}, 7.0);
+  for (int t = 1; t < 15; ++t) {
+    const std::string even = fmt::format("\n{:.5f},", t / 7.0);
+    const double time = t / 7.0 + (t % 2 == 0 ? 0.0 : 0.02) + (t > 10 ? longest_step - 1.0 / 7.0 : 0.0);
+    text.replace(text.find(even), even.size(), fmt::format("\n{:.5f},", time));
+  }
+  return text;
+}
+
+TEST(PeopleBadInput, UnevenTimesArePutInOrderWhereThatIsAskedFor) {
+  const auto edit = [](const std::string& text) { return [text](Standin& standin) { standin.files[0].bytes = text; }; };
+  const Standin standin = test::csv_standin();
+  PeopleOptions options;
+  options.task = Task::kWave;
+  EXPECT_SENTENCE(refusal(standin, edit(uneven_csv(1.0 / 7.0)), options));
+  options.fill_gaps = 0.25;
+  EXPECT_EQ(refusal(standin, edit(uneven_csv(1.0 / 7.0)), options), kNothing);
+  EXPECT_SENTENCE(refusal(standin, edit(uneven_csv(0.4)), options));
+  options.fill_gaps = 10.0;
+  EXPECT_SENTENCE(refusal(standin, edit(uneven_csv(9.0)), options));
+}
+
+TEST(PeopleBadInput, OnePersonAloneNeedsAPartner) {
+  const Standin standin = test::csv_pair_standin();
+  PeopleOptions options = with_all();
+  const auto only_a = [](Standin& edited) { edited.files.pop_back(), edited.paths.pop_back(); };
+  EXPECT_SENTENCE(refusal(standin, only_a, options));
+  const auto one = [](Standin& edited) {
+    edited.files[0].bytes = f4_npy({8, 25, 3}, std::vector<double>(8 * 75));
+    edited.paths = {edited.files[0].path};
+  };
+  EXPECT_SENTENCE(refusal(test::npy_standin(), one, options));
+  options.still_partner = true;
+  EXPECT_EQ(refusal(standin, only_a, options), kNothing);
+  EXPECT_EQ(refusal(
+                standin, [](Standin&) {}, options),
+            kNothing);  // each of the two alone
 }
 
 TEST(PeopleBadInput, WhatIsNoDataIsSaidByNameWhateverItsEnding) {

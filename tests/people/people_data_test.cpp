@@ -1,5 +1,7 @@
 // Readers of people on files that are there: the public stand-ins of examples/data, and the recordings of the shared
 // data.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -11,6 +13,7 @@
 #include "duet/core/file.h"
 #include "duet/core/numbers.h"
 #include "duet/core/require.h"
+#include "duet/motion/people/made_up.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/plausibility.h"
 #include "duet/people/bvh/bvh.h"
@@ -135,6 +138,69 @@ TEST(PeopleData, SbusLabelsAreTasks) {
   }
   EXPECT_EQ(handshakes, 18);
   EXPECT_EQ(hugs, 21);
+}
+
+// One person a recording: of each the first, as the makers' tables have him alone.
+TEST(PeopleData, WavesAndBowsOfOnePersonAreReadBesideAStillPartner) {
+  const std::string folder = test::shared_file("data/kinder");
+  if (folder.empty()) GTEST_SKIP() << "not run: data/kinder absent";
+  const test::ScratchFolder scratch;
+  int files = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() != ".npz") continue;
+    const std::vector<std::string> both = {entry.path().string()};
+    RawPeople people = find_people_format(both).read({.id = "k", .files = both, .entry = ""}, {});
+    write_file(scratch / (entry.path().stem().string() + ".csv"), test::csv_of(people, {0}, people.rate_hz));
+    ++files;
+  }
+  PeopleOptions options;
+  options.still_partner = true;
+  const std::vector<std::string> paths = {scratch / ""};
+  const PeopleFormat& format = find_people_format(paths);
+  int read = 0;
+  for (const ClipPlace& place : format.find(paths, options)) {
+    options.task = place.id.find("bow") == std::string::npos ? Task::kWave : Task::kBend;
+    try {
+      const SourceClip found = read_source_clip(format, place, options);
+      EXPECT_NEAR(made_up_of(found.clip.source).at("partner"), 1.0, 0.0);
+      ++read;
+    } catch (const InputError& error) {
+      ADD_FAILURE() << error.what();
+    }
+  }
+  EXPECT_EQ(files, 30);
+  EXPECT_EQ(read, 30);
+}
+
+// Eight joints of the upper body, as a tracker of hands and heads keeps them.
+TEST(PeopleData, AnArchiveOfUpperBodiesIsReadWithLegs) {
+  const test::ScratchFolder scratch;
+  JointLayout eight{.name = "eight", .names = {"head", "neck"}, .smpl = {}};
+  for (const char* part : {"shoulder", "elbow", "hand"})
+    for (const char* side : {"left_", "right_"}) eight.names.push_back(std::string(side) + part);
+  const JointLayout layout = layout_of_names(eight.name, eight.names, Legs::kMadeUp);
+  const RawPeople people = test::standin_people(test::standin_clip(40, 30.0), layout);
+  std::vector<double> values;
+  for (int t = 0; t < 40; ++t)
+    for (const PointTracks& joints : people.joints)
+      for (int k = 0; k < 8; ++k)
+        for (int axis = 0; axis < 3; ++axis) values.push_back(joints.at(t, k)[axis]);
+  Npz npz;
+  npz.set("positions", std::move(values), {40, 2, 8, 3});
+  npz.set("joints", eight.names);
+  npz.set_number("rate_hz", 30.0);
+  npz.set_text("label", "handshake");
+  npz.save(scratch / "upper.npz");
+  const std::vector<std::string> paths = {scratch / "upper.npz"};
+  const PeopleFormat& format = find_people_format(paths);
+  const SourceClip found = read_source_clip(format, format.find(paths, {}).at(0), {});
+  EXPECT_EQ(made_up_kinds(found.clip.source), "legs");
+  EXPECT_EQ(found.clip.frames(), 66);
+  // Without names of its own the same from a list of them.
+  write_file(scratch / "names.txt", fmt::format("{}\n", fmt::join(eight.names, "\n")));
+  PeopleOptions options;
+  options.skeleton = scratch / "names.txt";
+  EXPECT_EQ(read_source_clip(format, format.find(paths, options).at(0), options).clip.a.joints, found.clip.a.joints);
 }
 
 // Stand-ins have the quirks that are known; the makers' files have the others. DUET_MAKERS_FILES names a folder of

@@ -59,6 +59,14 @@ TEST(PeopleTable, RecordedStandBesideSynthetic) {
   EXPECT_THAT(values_of(analysis.estimates, &Estimate::task), testing::ElementsAre("hug", "handshake", "all"));
 }
 
+TEST(PeopleTable, ANoteCountsTheRecordedClipsOfWhichSomethingIsMadeUp) {
+  std::vector<EpisodeRow> rows = both_kinds();
+  EXPECT_EQ(people_analysis(rows).tables.front().notes.size(), 1U);
+  for (const std::size_t i : {0U, 1U}) test::set_tag(rows[i], kMadeUpTag, i == 0 ? "gaps+legs" : "legs");
+  EXPECT_THAT(people_analysis(rows).tables.front().notes,
+              ElementsAre(_, "Made up in 1 of 6 recorded clips: gaps.", "Made up in 2 of 6 recorded clips: legs."));
+}
+
 TEST(PeopleTable, OverallIsOfTheTasksThatBothKindsHave) {
   const Analysis analysis = people_analysis(both_kinds());
   EXPECT_EQ(estimate(analysis, {.task = "all", .of = "recorded", .name = "success"}).n, 6);
