@@ -80,7 +80,7 @@ void hold_base(Backend& backend);
 // Ankle feedback on the centre of mass, so that a robot under plain PD stands. Internal to backends/conformance.
 class AnkleBalance {
  public:
-  // Keeps a reference. The legs of its card have two joints or more, the last two are the ankle's.
+  // Keeps a reference. The last two joints of each leg of its card are the ankle's pitch and roll (lacks_ankles).
   explicit AnkleBalance(const RobotModel& robot);
   // The card's gains about `q`, with stiffer ankles that are moved by the feedback of `state`; call it every kPeriod.
   static constexpr double kPeriod = 0.01;  // [s]

@@ -10,6 +10,7 @@
 #include "duet/backends/conformance/trial.h"
 #include "duet/backends/engine_module.h"
 #include "duet/core/recording.h"
+#include "duet/robots/roles.h"
 
 namespace duet::conformance {
 namespace {
@@ -57,8 +58,13 @@ std::string lacks_soles(const RobotModel& robot) {
 }
 
 std::string lacks_ankles(const RobotModel& robot) {
-  for (const std::vector<int>& leg : robot.roles.legs)
+  for (const std::vector<int>& leg : robot.roles.legs) {
     if (leg.size() < 2) return fmt::format("the card of robot '{}' has no 'legs' of two or more joints", robot.name);
+    const int inner = leg[leg.size() - 2], outer = leg.back();
+    if (is_roll(robot, inner) == is_roll(robot, outer))
+      return fmt::format("a leg of robot '{}' ends in '{}' and '{}', expected an ankle's pitch and roll", robot.name,
+                         robot.joints[inner].name, robot.joints[outer].name);
+  }
   return lacks_soles(robot);
 }
 

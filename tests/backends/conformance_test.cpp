@@ -8,9 +8,10 @@
 #include <optional>
 #include <sstream>
 
-#include "duet/backends/conformance/conformance.h"
+#include "duet/backends/conformance/trial.h"
 #include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
+#include "duet/robots/robot_cards.h"
 #include "tests/support.h"
 
 namespace duet::conformance {
@@ -226,6 +227,14 @@ TEST(ConformanceSuite, ASceneThatTheRobotLacksSomethingForIsSkippedWithTheReason
   skips("self-collision", "the card of robot 'stick' has no pose 'hand_before_trunk'");
   skips("stand", "the card of robot 'stick' has no 'legs' of two or more joints");
   skips("held-push", "the card of robot 'stick' has no shape of the region 'torso'");
+}
+
+// The last two joints of its legs are knee and ankle: feedback of an ankle's pitch and roll would bend the knee.
+TEST(ConformanceSuite, ARobotWithOneAnkleJointIsNotBalancedByItsKnees) {
+  EXPECT_EQ(lacks_ankles(*load_shared_robot(shipped_card("h1"))),
+            "a leg of robot 'h1' ends in 'left_knee_joint' and 'left_ankle_joint', expected an ankle's pitch and roll");
+  for (const char* card : {"g1", "t1", "h1_2", "xbot_l", "agibot_x1"})
+    EXPECT_EQ(lacks_ankles(*load_shared_robot(shipped_card(card))), "") << card;
 }
 
 // Bounds of the table were found on the robot that stands in.
