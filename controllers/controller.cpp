@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
 
 namespace duet {
@@ -167,6 +169,56 @@ std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
                                          const std::shared_ptr<const RobotModel>& robot) {
   require(controller != nullptr && robot != nullptr, "make_guarded: expected a controller and a robot, found none");
   return std::make_unique<Guard>(std::move(controller), robot);
+}
+
+namespace {
+
+#ifdef DUET_SANITIZED
+constexpr double kLongestTick = 10.0 * kTick;  // [s]; checked code is slower by so much
+#else
+constexpr double kLongestTick = kTick;  // [s]
+#endif
+
+void act_for_a_tick(Controller& controller, const RobotState& state, JointCommand& command) {
+  for (int i = 0; i < controller.acts_per_tick(); ++i) controller.act(state, {state.X_WB, state.q}, command);
+}
+
+// The quickest first tick after a reset, in which every controller asks its network; the first that is on time will do
+// [s].
+double quickest_first_tick(Controller& controller, const RobotState& state, JointCommand& command) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kTriedTicks && least > kLongestTick; ++i) {
+    controller.reset(state);
+    const double begin = thread_computed_seconds();
+    act_for_a_tick(controller, state, command);
+    least = std::min(least, thread_computed_seconds() - begin);
+  }
+  return least;
+}
+
+}  // namespace
+
+void require_usable(Controller& controller, const RobotModel& robot, const std::string& name) {
+  const RobotState state = robot.standing_state();
+  JointCommand command = robot.default_command(state.q);
+  double quickest = 0.0;
+  try {
+    quickest = quickest_first_tick(controller, state, command);
+    for (int tick = 1; tick < kTriedTicks && quickest <= kLongestTick; ++tick)
+      act_for_a_tick(controller, state, command);
+  } catch (const std::exception&) {
+    return;
+  }
+  if (controller.faults().actions > 0)
+    throw InputError(
+        fmt::format("controller '{}': expected finite numbers for the standing pose of '{}', found others: its "
+                    "network is broken or is shown what it was not trained with",
+                    name, robot.name));
+  if (quickest > kLongestTick)
+    throw InputError(fmt::format(
+        "controller '{}': expected an answer within a tick of {:g} ms, found {:.3g} ms of computing in the quickest of "
+        "{} tries: take a smaller network, or one that acts less often in a tick",
+        name, 1e3 * kLongestTick, 1e3 * quickest, kTriedTicks));
 }
 
 namespace {

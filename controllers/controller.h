@@ -61,6 +61,15 @@ inline constexpr int kGuardRampTicks = 25;
 std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
                                          const std::shared_ptr<const RobotModel>& robot);
 
+// Ticks that a controller is tried in before its first episode.
+inline constexpr int kTriedTicks = 5;
+
+// Lets `controller`, guarded, act in the robot's standing pose, as long as that takes to know it. Throws InputError
+// where a command is not finite, and where the quickest of kTriedTicks first ticks computes for longer than a tick: what
+// else a busy machine does is not counted. One that throws is left to the episode, which says where. `name` is for
+// messages.
+void require_usable(Controller& controller, const RobotModel& robot, const std::string& name);
+
 // With kd at most `most` [N m s/rad], one per joint; all else is `controller`'s. Wraps any controller.
 std::unique_ptr<Controller> make_damped_at_most(std::unique_ptr<Controller> controller, Eigen::VectorXd most);
 

@@ -72,7 +72,8 @@ LoadedSubject load_subject(const AuditArguments& arguments) {
           ? load_shared_robot(card_path(subject.descriptor.robot))
           : std::make_shared<const RobotModel>(load_robot(card_path(subject.descriptor.robot), arguments.urdf));
   subject.make = controllers_of_network(subject.robot, loaded.network.make, loaded.path);
-  static_cast<void>(subject.make(subject.descriptor, {}));  // refuses other sizes before anything else is done
+  // Refuses other sizes and unusable answers before anything else is done.
+  require_usable(*subject.make(subject.descriptor, {}), *subject.robot, subject.descriptor.name);
   if (!arguments.trace.empty())
     loaded.trace = read_controller_trace(arguments.trace, subject.descriptor, *subject.robot);
   return loaded;

@@ -119,6 +119,7 @@ void Embodiments::load_controller_of(const Suite& suite, const SuiteController& 
   require_parts_of(suite, *robot, suite.card_of(controller));
   LoadedController loaded = load_controller(controller.use, robot, controller.options);
   const std::unique_ptr<Controller> made = loaded.make(controller.options);
+  if (!is_played_back(suite.engines)) require_usable(*made, *robot, controller.name);
   take_notes(loaded.notes);
   if (has_explicit_law(suite))
     take_notes(actuation_notes(suite, controller.name, robot, standing_gains(*made, *robot)));

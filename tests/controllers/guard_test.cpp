@@ -1,7 +1,11 @@
 
+#include <gmock/gmock.h>
+
 #include <limits>
 
 #include "duet/controllers/controller.h"
+#include "duet/core/machine.h"
+#include "duet/core/require.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/support.h"
@@ -171,6 +175,58 @@ TEST_F(Guarded, AllocatesNothingInTheSafeStop) {
   const long before = test::allocation_count();
   for (int tick = 0; tick < 40; ++tick) act();
   EXPECT_EQ(test::allocation_count(), before);
+}
+
+TEST_F(Guarded, IsRefusedWhereACommandIsNotFinite) {
+  offset = kNan;
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { require_usable(*controller, *robot, "offset"); }));
+}
+
+// Computes for 25 ms before it answers, in its first `late` acts; throws where it is told to.
+struct Late final : Controller {
+  [[nodiscard]] std::string_view name() const override { return "late"; }
+  void reset(const RobotState&) override {}
+  void act(const RobotState&, const Reference&, JointCommand&) override {
+    if (throws) throw std::runtime_error("no such gain");
+    const double begin = thread_computed_seconds();
+    while (calls < late && thread_computed_seconds() < begin + 0.025) continue;
+    ++calls;
+  }
+
+  int calls = 0, late = 0;
+  bool throws = false;
+};
+
+TEST(RequireUsable, LetsAControllerActForAFewTicks) {
+  Late quick;
+  EXPECT_NO_THROW(require_usable(quick, *test::g1(), "mine"));
+  EXPECT_EQ(quick.calls, kTriedTicks);
+}
+
+TEST(RequireUsable, RefusesAControllerWhoseQuickestTickIsLate) {
+#ifdef DUET_SANITIZED
+  GTEST_SKIP() << "not run: checked code may be slower";
+#endif
+  Late late;
+  late.late = 1000;
+  EXPECT_THAT(
+      thrown_message<InputError>([&] { require_usable(late, *test::g1(), "mine"); }),
+      ::testing::MatchesRegex("controller 'mine': expected an answer within a tick of 20 ms, found 2[5-9][.0-9]* "
+                              "ms of computing in the quickest of 5 tries: take a smaller network, or one that "
+                              "acts less often in a tick"));
+  EXPECT_EQ(late.calls, kTriedTicks);
+}
+
+TEST(RequireUsable, OneAnswerOnTimeWillDo) {
+  Late late;
+  late.late = kTriedTicks - 1;
+  EXPECT_NO_THROW(require_usable(late, *test::g1(), "mine"));
+}
+
+TEST(RequireUsable, LeavesWhatThrowsToTheEpisode) {
+  Late late;
+  late.throws = true;
+  EXPECT_NO_THROW(require_usable(late, *test::g1(), "mine"));
 }
 
 }  // namespace

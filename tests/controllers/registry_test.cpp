@@ -133,6 +133,18 @@ TEST(ExplicitStepOption, LowersTheDampingThatWouldShake) {
               HasSubstr("controller 'pd': "));
 }
 
+// The root of gravity's third number, which is -1 where the robot stands.
+TEST(RequireUsable, RefusesANetworkWhoseActionsAreNotFinite) {
+  const test::ScratchFolder folder;
+  test::OnnxWriter file;
+  file.input("obs", {1, 47}).constant("w", {47, 12}, std::vector<float>(47 * 12, 0.1F));
+  file.node("Sqrt", {"obs"}, {"root"}).node("MatMul", {"root", "w"}, {"actions"}).output("actions");
+  write_file(folder / "root.onnx", file.bytes());
+  const auto robot = test::body("g1_12dof");
+  const auto controller = make_controller("rl_gym", robot, {{"network", folder / "root.onnx"}});
+  EXPECT_SENTENCE(thrown_message<InputError>([&] { require_usable(*controller, *robot, "rl_gym"); }));
+}
+
 TEST(ArmsOption, TakesTheArmsFromTheControllerAndNothingElse) {
   const auto robot = test::body("g1");
   const RobotState state = robot->standing_state();

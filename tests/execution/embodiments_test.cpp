@@ -1,5 +1,7 @@
 #include "duet/experiment/plan/embodiments.h"
 
+#include <limits>
+
 #include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
@@ -129,6 +131,25 @@ TEST(OnOtherBody, OfStrangersIsRefused) {
   for (RobotJoint& joint : body.joints) joint.name += "_of_another";
   EXPECT_SENTENCE(
       test::thrown_message<std::invalid_argument>([&] { on_other_body(std::make_unique<Mirror>(), robot, body); }));
+}
+
+TEST(Embodiments, AControllerOfNumbersThatAreNotFiniteIsRefusedBeforeTheFirstEpisode) {
+  register_controller({.name = "nowhere", .about = "a controller without an answer", .robot = "", .options = {}},
+                      [](const std::shared_ptr<const RobotModel>&, const ControllerOptions&) {
+                        struct Nowhere final : Controller {
+                          [[nodiscard]] std::string_view name() const override { return "nowhere"; }
+                          void reset(const RobotState&) override {}
+                          void act(const RobotState&, const Reference&, JointCommand& command) override {
+                            command.q_target.setConstant(std::numeric_limits<double>::quiet_NaN());
+                          }
+                        };
+                        return std::make_unique<Nowhere>();
+                      });
+  Suite suite = test::playback_suite();
+  suite.controllers = {SuiteController{"nowhere"}};
+  EXPECT_NO_THROW(Embodiments{suite});  // nothing acts where clips are played back
+  suite.engines = {"mujoco"};
+  EXPECT_SENTENCE(test::thrown_message<InputError>([&] { const Embodiments bodies(suite); }));
 }
 
 TEST(Embodiments, PerturbationsAreCheckedOnEveryBody) {
