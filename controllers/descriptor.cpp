@@ -244,6 +244,7 @@ class Reader {
             required_key({"licence"}, &D::licence),
             {"robot", [this](Top root, D& out) { out.robot = robot_of(root.text("robot"), file_); }},
             required_key({"network"}, &D::network),
+            {"networks", [this](Top root, D&) { read_networks(root); }},
             {"rate_hz", read_rate},
             optional_key({"walks"}, &D::walks),
             optional_key({.name = "waist", .choices = {"free", "locked"}}, &D::waist_locked),
@@ -257,6 +258,19 @@ class Reader {
             {"inputs", [this](Top root, D&) { read_inputs(root); }},
             {"action"},
             mapping_key("command", &D::command, command_schema())};
+  }
+
+  void read_networks(Top root) {
+    using N = OtherNetwork;
+    static const Schema<N> schema = {required_key({"name"}, &N::name), required_key({"file"}, &N::file)};
+    if (!root.has("networks")) return;
+    for (const YAML::Node& node : root.items("networks")) {
+      N network;
+      const YamlSection s = read_mapping(file_, node, label("network", node, "name"), schema, network);
+      if (std::ranges::find(out_.networks, network.name, &N::name) != out_.networks.end())
+        s.fail(s.line("name"), fmt::format("expected each network once, found '{}' again", network.name));
+      out_.networks.push_back(std::move(network));
+    }
   }
 
   void read_joints(Top root) {
@@ -399,6 +413,8 @@ class Reader {
   static Schema<HistoryRule> history_schema() {
     using H = HistoryRule;
     return {{"groups"},
+            {"from"},
+            {"size"},
             optional_key({.name = "frames", .range = {1.0, kMostFrames}}, &H::frames),
             optional_key({"current"}, &H::current),
             optional_key({.name = "start", .choices = {"zeros", "repeated"}}, &H::starts_full)};
@@ -407,9 +423,25 @@ class Reader {
   void read_part(const YAML::Node& node, InputPart& part) const {
     const YamlSection s = read_mapping(file_, node, "part", history_schema(), part.history);
     part.line = s.line();
+    if (s.has("from")) return read_output(s, part);
+    if (s.has("size")) s.fail_key("size", "expected the key 'from' beside it, found none");
     for (const std::string& name : names_in(s, "groups"))
       part.groups.push_back(place_of(s, "groups", "group", name, group_names_));
     if (part.groups.empty()) s.fail_key("groups", "expected at least one, found none");
+  }
+
+  // "from: encoder.latent, size: 16" in the place of groups.
+  void read_output(const YamlSection& s, InputPart& part) const {
+    for (const char* key : {"groups", "frames", "current", "start"})
+      if (s.has(key)) s.fail_key(key, "expected 'size' alone beside 'from', found the key");
+    part.from = s.text("from");
+    const auto runs = [&](const OtherNetwork& network) { return part.from.starts_with(network.name + "."); };
+    if (std::ranges::none_of(out_.networks, runs))
+      s.fail_key("from", fmt::format("expected NETWORK.OUTPUT of one of 'networks', found '{}'", part.from));
+    const double size = s.number("size");
+    if (size < 1.0 || size > kMostFrames || size != std::floor(size))
+      s.refuse_key("size", fmt::format("a whole number from 1 to {}", kMostFrames).c_str(), s.node("size"));
+    part.size = static_cast<int>(size);
   }
 
   std::string file_;

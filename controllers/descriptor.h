@@ -54,12 +54,18 @@ struct VelocityInterface {
   std::optional<StandBounds> stands_below{};
 };
 
+// A network that runs before the policy's own.
+struct OtherNetwork {
+  std::string name, file;
+};
+
 struct Descriptor {
   std::string file;  // where it was read, for messages
   std::string name, about, licence;
-  std::string robot;           // card: a name (robots/robot_cards.h) or a path
-  std::string network;         // file name
-  double rate_hz = kTickRate;  // at which the network acts: kTickRate, a whole part of it or a whole multiple
+  std::string robot;                     // card: a name (robots/robot_cards.h) or a path
+  std::string network;                   // file name
+  std::vector<OtherNetwork> networks{};  // those that run before it, in their order
+  double rate_hz = kTickRate;            // at which the network acts: kTickRate, a whole part of it or a whole multiple
   bool walks = false;
   bool waist_locked = false;  // unless the option says otherwise
   std::vector<DescriptorJoint> joints;

@@ -11,7 +11,7 @@ int channels_size(std::span<const Channel> channels, const ChannelWidths& widths
 }
 
 int ObservationLayout::part_size(const InputPart& part, const ChannelWidths& widths) const {
-  int size = 0;
+  int size = part.size;
   for (const int group : part.groups) size += channels_size(groups[group].channels, widths);
   return size;
 }
@@ -22,6 +22,7 @@ std::vector<LayoutBlock> ObservationLayout::blocks(const ObservationInput& input
   for (const InputPart& part : input.parts) {
     LayoutBlock& block = blocks.emplace_back();
     block.frames = part.history.frames;
+    if (!part.from.empty()) block.entries.push_back({part.from, part.size});
     for (const int group : part.groups)
       for (const Channel& channel : groups[group].channels)
         block.entries.push_back({channel_name(channel.kind, format), channel_size(channel, widths)});

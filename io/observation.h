@@ -51,6 +51,8 @@ struct InputPart {
   int line = 0;
   std::vector<int> groups;
   HistoryRule history{};
+  std::string from{};  // output of a network in the place of groups; its numbers are 0 here
+  int size = 0;        // of that output
 };
 
 struct ObservationInput {

@@ -66,7 +66,7 @@ LoadedSubject load_subject(const AuditArguments& arguments) {
   const ControllerOptions options =
       arguments.network.empty() ? ControllerOptions{} : ControllerOptions{{"network", arguments.network}};
   loaded.path = find_network(subject.descriptor, options);
-  loaded.network = load_network_file(loaded.path);
+  loaded.network = load_networks(subject.descriptor, options);
   subject.robot =
       arguments.urdf.empty()
           ? load_shared_robot(card_path(subject.descriptor.robot))

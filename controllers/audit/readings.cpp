@@ -466,6 +466,7 @@ class Readings {
     }
     for (std::size_t i = 0; i < base_.observation.inputs.size(); ++i) {
       const std::vector<InputPart>& parts = base_.observation.inputs[i].parts;
+      if (shows_outputs(parts)) continue;
       for (std::size_t a = 0; a < parts.size(); ++a)
         for (std::size_t b = a + 1; b < parts.size(); ++b) {
           Descriptor other = base_;
@@ -480,6 +481,10 @@ class Readings {
   static ContractPart order_part(const Channel& a, const Channel& b) {
     return is_clock(a.kind) && is_clock(b.kind) ? ContractPart::kClock : ContractPart::kChannelOrder;
   }
+  // Whether outputs of a network have their places among them.
+  static bool shows_outputs(const std::vector<InputPart>& parts) {
+    return std::ranges::any_of(parts, [](const InputPart& part) { return !part.from.empty(); });
+  }
   [[nodiscard]] const std::string& group_name(const InputPart& part) const {
     return base_.observation.groups[part.groups[0]].name;
   }
@@ -488,7 +493,7 @@ class Readings {
     for (std::size_t i = 0; i < base_.observation.inputs.size(); ++i) {
       const ObservationInput& input = base_.observation.inputs[i];
       const auto has_frames = [](const InputPart& part) { return part.history.frames > 1; };
-      if (std::ranges::none_of(input.parts, has_frames)) continue;
+      if (std::ranges::none_of(input.parts, has_frames) || shows_outputs(input.parts)) continue;
       add_majors(i);
       Descriptor full = base_, shifted = base_;
       for (InputPart& part : full.observation.inputs[i].parts) part.history.starts_full = !part.history.starts_full;

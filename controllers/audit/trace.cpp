@@ -159,12 +159,12 @@ struct Seen {
 
 class SpiedNetwork final : public Network {
  public:
-  SpiedNetwork(std::unique_ptr<Network> network, std::shared_ptr<Seen> seen, std::size_t output)
-      : network_(std::move(network)), seen_(std::move(seen)), output_(output) {}
+  SpiedNetwork(std::unique_ptr<Network> network, std::shared_ptr<Seen> seen, std::size_t input, std::size_t output)
+      : network_(std::move(network)), seen_(std::move(seen)), input_(input), output_(output) {}
   [[nodiscard]] std::span<const Port> inputs() const override { return network_->inputs(); }
   [[nodiscard]] std::span<const Port> outputs() const override { return network_->outputs(); }
   void run(std::span<const std::span<const float>> inputs, std::span<const std::span<float>> outputs) override {
-    seen_->shown.assign(inputs[0].begin(), inputs[0].end());
+    seen_->shown.assign(inputs[input_].begin(), inputs[input_].end());
     network_->run(inputs, outputs);
     seen_->answered.assign(outputs[output_].begin(), outputs[output_].end());
   }
@@ -173,13 +173,14 @@ class SpiedNetwork final : public Network {
  private:
   std::unique_ptr<Network> network_;
   std::shared_ptr<Seen> seen_;
-  std::size_t output_;
+  std::size_t input_, output_;
 };
 
 // The names of the numbers of the first input: "joint_velocity of 'left_knee_joint'", with the frame where it has many.
 std::vector<std::string> number_names(const Descriptor& descriptor) {
   std::vector<std::string> names;
-  for (const InputPart& part : shown_input(descriptor).parts)
+  for (const InputPart& part : shown_input(descriptor).parts) {
+    for (int i = 0; i < part.size; ++i) names.push_back(fmt::format("{} {}", part.from, i));
     for (int frame = 0; frame < part.history.frames; ++frame)
       for (const int g : part.groups)
         for (const Channel& channel : descriptor.observation.groups[g].channels) {
@@ -194,6 +195,7 @@ std::vector<std::string> number_names(const Descriptor& descriptor) {
             names.push_back(std::move(name));
           }
         }
+  }
   return names;
 }
 
@@ -288,10 +290,13 @@ Replayed replay_trace(const Descriptor& descriptor, const std::shared_ptr<const 
   const auto seen = std::make_shared<Seen>();
   const auto told = std::make_shared<VelocityCommand>(trace.commands[0]);
   std::unique_ptr<Network> made = network();
-  std::size_t output = 0;
-  for (std::size_t i = 0; i < made->outputs().size(); ++i)
-    if (made->outputs()[i].name == descriptor.output) output = i;
-  auto spied = std::make_unique<SpiedNetwork>(std::move(made), seen, output);
+  const auto place_of = [](std::span<const Port> ports, const std::string& name) {
+    const auto found = std::ranges::find(ports, name, &Port::name);
+    return found == ports.end() ? std::size_t{0} : static_cast<std::size_t>(found - ports.begin());
+  };
+  const std::size_t input = place_of(made->inputs(), shown_input(descriptor).name),
+                    output = place_of(made->outputs(), descriptor.output);
+  auto spied = std::make_unique<SpiedNetwork>(std::move(made), seen, input, output);
   const bool fast = descriptor.acts_per_tick() > 1;
   if (fast && commands_change(trace))
     throw InputError(

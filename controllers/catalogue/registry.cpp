@@ -8,6 +8,7 @@
 #include <sstream>
 #include <utility>
 
+#include "duet/controllers/composed_network.h"
 #include "duet/controllers/controller.h"
 #include "duet/controllers/descriptor_controller.h"
 #include "duet/controllers/vmc.h"
@@ -267,8 +268,8 @@ JointGains standing_gains(const std::string& name, const std::shared_ptr<const R
 
 namespace {
 
-std::vector<std::string> network_places(const Descriptor& descriptor) {
-  return published_places(std::filesystem::path(descriptor.file).parent_path().string(), descriptor.network);
+std::vector<std::string> network_places(const Descriptor& descriptor, const std::string& file) {
+  return published_places(std::filesystem::path(descriptor.file).parent_path().string(), file);
 }
 
 }  // namespace
@@ -293,7 +294,7 @@ std::string known_digest(const std::string& network) {
 std::string find_network(const Descriptor& descriptor, const ControllerOptions& options) {
   const auto given = options.find("network");
   const std::vector<std::string> places =
-      given == options.end() ? network_places(descriptor) : std::vector<std::string>{given->second};
+      given == options.end() ? network_places(descriptor, descriptor.network) : std::vector<std::string>{given->second};
   try {
     return first_existing(fmt::format("network of the controller '{}'", descriptor.name), places);
   } catch (const MissingError& error) {
@@ -302,10 +303,44 @@ std::string find_network(const Descriptor& descriptor, const ControllerOptions& 
   }
 }
 
+namespace {
+
+std::string find_other(const Descriptor& descriptor, const OtherNetwork& network) {
+  try {
+    return first_existing(fmt::format("network '{}' of the controller '{}'", network.name, descriptor.name),
+                          network_places(descriptor, network.file));
+  } catch (const MissingError& error) {
+    throw MissingError(fmt::format("{} (DUET_MODELS says where it is{})", error.what(), known_digest(network.file)));
+  }
+}
+
+}  // namespace
+
+NetworkFile load_networks(const Descriptor& descriptor, const ControllerOptions& options) {
+  const std::string engine = option_or(options, "engine", "duet");
+  NetworkFile policy = load_network_file(find_network(descriptor, options), engine);
+  if (descriptor.networks.empty()) return policy;
+  std::vector<NetworkMaker> makers;
+  for (const OtherNetwork& network : descriptor.networks)
+    makers.push_back(load_network_file(find_other(descriptor, network), engine).make);
+  makers.push_back(policy.make);
+  policy.make = [descriptor, makers] {
+    std::vector<std::unique_ptr<Network>> networks;
+    for (const NetworkMaker& make : makers) networks.push_back(make());
+    return compose_networks(descriptor, std::move(networks));
+  };
+  return policy;
+}
+
 LoadedFiles published_files(const std::string& name, const ControllerOptions& options) {
   const Descriptor descriptor = load_descriptor(name);
   LoadedFiles files = {{"descriptor", descriptor.file}};
   for (LoadedFile& file : network_files(find_network(descriptor, options))) files.push_back(std::move(file));
+  for (const OtherNetwork& network : descriptor.networks)
+    for (LoadedFile& file : network_files(find_other(descriptor, network))) {
+      file.role = fmt::format("{} {}", network.name, file.role);
+      files.push_back(std::move(file));
+    }
   return files;
 }
 
@@ -313,7 +348,7 @@ ToldLoader load_told(const std::string& name, std::shared_ptr<const RobotModel> 
                      const ControllerOptions& options) {
   const Descriptor descriptor = load_descriptor(name);
   const std::string path = find_network(descriptor, options);
-  const NetworkFile network = load_network_file(path, option_or(options, "engine", "duet"));
+  const NetworkFile network = load_networks(descriptor, options);
   return {[=, robot = std::move(robot), make = network.make](const ControllerOptions& now,
                                                              std::shared_ptr<const VelocityCommand> told) {
             return make_descriptor_controller(descriptor, robot, make(), path, now, std::move(told));

@@ -10,6 +10,7 @@
 #include "duet/controllers/descriptor.h"
 #include "duet/controllers/root_conversion.h"
 #include "duet/core/file.h"
+#include "duet/nn/catalogue/load_network.h"
 #include "duet/robots/explicit_step.h"
 #include "duet/robots/robot_model.h"
 
@@ -67,6 +68,10 @@ Descriptor load_descriptor(const std::string& name);
 // Throws MissingError naming the places and, where it is known, the network's digest (controllers/networks.sha256).
 std::string find_network(const Descriptor& descriptor, const ControllerOptions& options = {});
 
+// The networks of a descriptor, each read once, as one (controllers/composed_network.h); the metadata are those of its
+// policy's. `path` of the policy's is find_network's. Throws as find_network, load_network_file and compose_networks.
+NetworkFile load_networks(const Descriptor& descriptor, const ControllerOptions& options = {});
+
 // Descriptor and network, loaded once for many controllers, each told a velocity as make_descriptor_controller has it;
 // `told` may be null. The options are those of load_controller (controllers/catalogue/registry.h). Thread-safe.
 struct ToldLoader {
@@ -78,7 +83,8 @@ struct ToldLoader {
 // Throws InputError too where the network's file has the joints in another order.
 ToldLoader load_told(const std::string& name, std::shared_ptr<const RobotModel> robot,
                      const ControllerOptions& options);
-// The descriptor, its network, and each file of the network's external data ("network data NAME").
+// The descriptor, its network, and each file of the network's external data ("network data NAME"); the same of its
+// other networks ("encoder network").
 LoadedFiles published_files(const std::string& name, const ControllerOptions& options);
 
 }  // namespace duet
