@@ -145,6 +145,13 @@ const Schema<VelocityInterface>& command_schema() {
   return schema;
 }
 
+const Schema<OwnPhysics>& own_physics_schema() {
+  using P = OwnPhysics;
+  static const Schema<P> schema = {optional_key({.name = "dt", .range = kPositive}, &P::dt),
+                                   optional_key({.name = "height", .range = kPositive}, &P::height)};
+  return schema;
+}
+
 // "standing: zero" or a phase for each of `phases`.
 void read_standing(const YamlSection& s, GaitClock& gait) {
   if (!s.has("standing")) return;
@@ -257,7 +264,8 @@ class Reader {
             {"observation", [this](Top root, D&) { read_groups(root); }},
             {"inputs", [this](Top root, D&) { read_inputs(root); }},
             {"action"},
-            mapping_key("command", &D::command, command_schema())};
+            mapping_key("command", &D::command, command_schema()),
+            mapping_key("own_physics", &D::own_physics, own_physics_schema())};
   }
 
   void read_networks(Top root) {

@@ -59,6 +59,12 @@ struct OtherNetwork {
   std::string name, file;
 };
 
+// The simulation of a network's makers, and how it stands there.
+struct OwnPhysics {
+  std::optional<double> dt;      // physics step [s]
+  std::optional<double> height;  // of the base where it stands [m]
+};
+
 struct Descriptor {
   std::string file;  // where it was read, for messages
   std::string name, about, licence;
@@ -76,6 +82,7 @@ struct Descriptor {
   double action_clip = std::numeric_limits<double>::infinity();  // of the output's size, before its scale
   bool within_limits = false;  // targets of joints with an action are kept within the robot's limits
   std::optional<VelocityInterface> command;
+  std::optional<OwnPhysics> own_physics;  // for the audit
 
   [[nodiscard]] int actions() const;                             // joints with an action
   [[nodiscard]] std::vector<ActionRange> action_ranges() const;  // one for each action

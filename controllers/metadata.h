@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,5 +15,9 @@ std::vector<std::string> metadata_words(const std::string& text);
 
 // A joint's name without case, "_joint", "_link", "-" for "_": the same joint under the names of two makers.
 std::string plain_joint(std::string name);
+
+// The physics step of the simulation in which a network's makers trained it, where its file says (holosoma's
+// `experiment_config`) [s].
+std::optional<double> physics_step_of(const Metadata& metadata);
 
 }  // namespace duet

@@ -13,6 +13,7 @@
 #include "duet/controllers/import/descriptor_import.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/experiment/plan/actuation_limits.h"
 #include "duet/nn/catalogue/load_network.h"
 #include "duet/report/tables/text_table.h"
 #include "duet/robots/robot_cards.h"
@@ -72,6 +73,7 @@ LoadedSubject load_subject(const AuditArguments& arguments) {
           ? load_shared_robot(card_path(subject.descriptor.robot))
           : std::make_shared<const RobotModel>(load_robot(card_path(subject.descriptor.robot), arguments.urdf));
   subject.make = controllers_of_network(subject.robot, loaded.network.make, loaded.path);
+  subject.physics = trial_physics(subject.descriptor, loaded.network.metadata, *subject.robot);
   // Refuses other sizes and unusable answers before anything else is done.
   require_usable(*subject.make(subject.descriptor, {}), *subject.robot, subject.descriptor.name);
   if (!arguments.trace.empty())
@@ -87,6 +89,9 @@ void add_level_0(const LoadedSubject& loaded, ControllerAudit& audit) {
        fmt::format("{} numbers in, {} out, on {}", descriptor.input_size(descriptor.observation.inputs[0]),
                    descriptor.actions(), loaded.subject.robot->name),
        ""}};
+  const AuditSubject& subject = loaded.subject;
+  const JointGains gains = standing_gains(*subject.make(descriptor, {}), *subject.robot);
+  checks.push_back({0, "explicit law holds up to", to_text(actuation_limits(subject.robot, gains)), ""});
   std::vector<std::string> notes;
   try {
     notes = compare_with_network(descriptor, loaded.network.metadata, loaded.path);

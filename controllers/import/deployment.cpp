@@ -242,6 +242,8 @@ class DeploymentReader {
     if (robot && robot["dt"] && robot["decimation"]) {
       draft.rate_hz = 1.0 / (robot["dt"].as<double>() * robot["decimation"].as<double>());
       draft.from["rate_hz"] = "base.yaml: 1 / ('dt' 'decimation')";
+      draft.dt = robot["dt"].as<double>();
+      draft.from["own_physics"] = "base.yaml: 'dt'";
     } else {
       draft.assumed.emplace_back("rate_hz is 50: there is no base.yaml that says");
     }
@@ -292,6 +294,8 @@ class DeploymentReader {
     draft.from["joints"] = "kp: 'kps'; kd: 'kds'; default: 'default_angles'; action: 'action_scale'";
     draft.rate_hz = 1.0 / (number_or(root_, "simulation_dt", 0.002) * number_or(root_, "control_decimation", 10.0));
     draft.from["rate_hz"] = "1 / ('simulation_dt' 'control_decimation')";
+    if (root_["simulation_dt"]) draft.dt = root_["simulation_dt"].as<double>();
+    draft.from["own_physics"] = "'simulation_dt'";
     const std::pair<const char*, const char*> terms[] = {{"base_ang_vel", "ang_vel_scale"},
                                                          {"projected_gravity", ""},
                                                          {"commands", "cmd_scale"},

@@ -270,6 +270,7 @@ class Importer {
         "network: {}\nrate_hz: {:.9g}{}\n{}\n",
         made_.name, fs::path(request_.file).filename().string(), body_.card, network_text(), draft_.rate_hz,
         from("rate_hz"), draft_.command ? "walks: true\n" : "");
+    if (draft_.dt) text += fmt::format("own_physics: {{dt: {:.9g}}}{}\n\n", *draft_.dt, from("own_physics"));
     text += joints_text() + "\n" + observation_text();
     std::vector<std::string> action;
     if (!output_.empty()) action.push_back("output: " + output_);

@@ -29,6 +29,7 @@ struct Draft {
   std::string network{};  // file name that the file gives; "": none
   std::string card{};     // of the body whose joints stand for motors without names; "": joints have names
   double rate_hz = kTickRate;
+  std::optional<double> dt{};                     // physics step of its simulation [s]
   std::vector<DescriptorJoint> joints{};          // in the network's order
   std::vector<DraftTerm> terms{};                 // in the order of the input
   bool frame_major = false, starts_full = false;  // of its history

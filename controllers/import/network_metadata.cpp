@@ -236,6 +236,8 @@ class MetadataReader {
     draft.rate_hz = number_or(config, {"simulator", "config", "sim", "fps"}, 200.0) /
                     number_or(config, {"simulator", "config", "sim", "control_decimation"}, 4.0);
     draft.from["rate_hz"] = "experiment_config's simulator.config.sim: fps / control_decimation";
+    draft.dt = physics_step_of(metadata_);
+    draft.from["own_physics"] = "experiment_config's simulator.config.sim: 1 / fps";
     draft.action_clip = number_or(control, {"action_clip_value"}, 100.0);
     draft.from["action"] = "experiment_config's robot.control.action_clip_value";
     read_groups(draft, config);
@@ -270,6 +272,18 @@ class MetadataReader {
 };
 
 }  // namespace
+
+std::optional<double> physics_step_of(const Metadata& metadata) {
+  const auto found = metadata.find("experiment_config");
+  if (found == metadata.end()) return std::nullopt;
+  try {
+    const YAML::Node config = parse_yaml(found->second, "experiment_config");
+    const auto fps = config["simulator"]["config"]["sim"]["fps"].as<double>();
+    return fps > 0.0 ? std::optional(1.0 / fps) : std::nullopt;
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
 
 Draft draft_of_metadata(const Metadata& metadata, const std::string& file, const std::string& card) {
   try {

@@ -27,7 +27,8 @@ namespace {
 
 class Search {
  public:
-  Search(const AuditSubject& subject, const std::string& engine) : subject_(subject), ground_(engine, subject.robot) {
+  Search(const AuditSubject& subject, const std::string& engine)
+      : subject_(subject), ground_(engine, subject.robot, subject.physics.dt) {
     for (const DescriptorJoint& joint : subject.descriptor.joints)
       if (!joint.action) posture_[joint.name] = joint.neutral;
   }
@@ -135,14 +136,14 @@ void add_level_1(const AuditSubject& subject, const ReadingSearch& search, Contr
                           fmt::format("below {:g}", kMostFollowing), follows.value < kMostFollowing});
 }
 
-AuditCheck trial_check(const RobotModel& robot, const TrialTask& task, const TrialResult& result) {
+AuditCheck trial_check(const TrialPhysics& physics, const TrialTask& task, const TrialResult& result) {
   if (!result.upright)
     return {2, task.name, fmt::format("falls after {:.2f} s", result.lasted),
             fmt::format("upright for {:g} s", task.seconds), false};
   if (task.told.isZero()) {
-    const double loss = 1.0 - result.height / robot.standing_height;
+    const double loss = 1.0 - result.height / physics.height;
     return {2, task.name, fmt::format("pelvis at {:.2f} m, drifts {:.2f} m", result.height, result.drift),
-            fmt::format("{:.2f} m +- {:g} %", robot.standing_height, 100.0 * 2.0 * kMostHeightLoss),
+            fmt::format("{:.2f} m +- {:g} %, {}", physics.height, 100.0 * 2.0 * kMostHeightLoss, physics.height_from),
             std::abs(loss) < 2.0 * kMostHeightLoss};
   }
   Eigen::Index axis = 0;
@@ -172,8 +173,14 @@ ControllerAudit audit_controller(const AuditSubject& subject, const std::string&
   const ReadingSearch search = search_readings(subject, engine);
   ControllerAudit audit;
   add_level_1(subject, search, audit);
+  TrialPhysics physics = subject.physics;
+  if (physics.height == 0.0) physics.height = subject.robot->standing_height;
+  audit.checks.push_back({2, "physics",
+                          fmt::format("{} at {:g} ms, {}; gains of its descriptor", engine,
+                                      1e3 * (physics.dt > 0.0 ? physics.dt : Scene{}.dt), physics.dt_from),
+                          ""});
   for (std::size_t i = 0; i < search.tasks.size(); ++i)
-    audit.checks.push_back(trial_check(*subject.robot, search.tasks[i], search.own.trials[i]));
+    audit.checks.push_back(trial_check(physics, search.tasks[i], search.own.trials[i]));
   for (const NamedDefect& defect : search.better)
     if (audit.defects.size() < kMostNamed && defect.cost < search.better[0].cost + kAsGood)
       audit.defects.push_back(defect);

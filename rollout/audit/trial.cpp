@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "duet/backends/engine_module.h"
 #include "duet/rollout/world.h"
@@ -47,9 +48,42 @@ std::vector<TrialTask> confirming_tasks(const Descriptor& descriptor) {
   return tasks;
 }
 
-TrialGround::TrialGround(const std::string& engine, std::shared_ptr<const RobotModel> robot)
+namespace {
+
+// Whether acts begin at a physics step, also at the 100 Hz of another reading.
+bool fits(double dt, const Descriptor& descriptor) {
+  const auto divides = [&](double period) {
+    const double steps = period / dt;
+    return steps > 0.5 && std::abs(steps - std::round(steps)) < 1e-6;
+  };
+  return divides(kTick / 2.0) && divides(kTick / descriptor.acts_per_tick());
+}
+
+}  // namespace
+
+TrialPhysics trial_physics(const Descriptor& descriptor, const Metadata& metadata, const RobotModel& robot) {
+  TrialPhysics physics{.height = robot.standing_height};
+  const OwnPhysics own = descriptor.own_physics.value_or(OwnPhysics{});
+  if (own.height) {
+    physics.height = *own.height;
+    physics.height_from = "its descriptor";
+  }
+  const std::optional<double> dt = own.dt ? own.dt : physics_step_of(metadata);
+  if (!dt) return physics;
+  const std::string from = own.dt ? "its descriptor" : "its network's file";
+  if (!fits(*dt, descriptor)) {
+    physics.dt_from = fmt::format("of the profile parity: the {:g} ms of {} do not divide its ticks", 1e3 * *dt, from);
+    return physics;
+  }
+  physics.dt = *dt;
+  physics.dt_from = fmt::format("as {} says", from);
+  return physics;
+}
+
+TrialGround::TrialGround(const std::string& engine, std::shared_ptr<const RobotModel> robot, double dt)
     : robot_(std::move(robot)) {
   Scene scene;
+  if (dt > 0.0) scene.dt = dt;
   scene.robot = robot_;
   scene.partner = PartnerMode::kNone;
   backend_ = make_backend(engine, scene);

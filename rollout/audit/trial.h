@@ -9,6 +9,7 @@
 #include "duet/backends/backend.h"
 #include "duet/controllers/controller.h"
 #include "duet/controllers/descriptor.h"
+#include "duet/controllers/metadata.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {
@@ -39,12 +40,25 @@ std::vector<TrialTask> trial_tasks(const Descriptor& descriptor);
 // Others of the same kind: slower, to the other side, longer.
 std::vector<TrialTask> confirming_tasks(const Descriptor& descriptor);
 
-// From the start of the trial in MuJoCo with the profile `parity`; one robot in one engine, used again and again. Not
+// The physics of the trials, and which file says so.
+struct TrialPhysics {
+  double dt = 0.0;  // step [s]; 0: of the profile `parity`
+  std::string dt_from = "of the profile parity: neither descriptor nor network says one";
+  double height = 0.0;  // of the base where it stands [m]
+  std::string height_from = "its robot's card";
+};
+
+// The step of the descriptor, else of its network's file, where it fits into the network's ticks; the height of the
+// descriptor, else of the robot.
+TrialPhysics trial_physics(const Descriptor& descriptor, const Metadata& metadata, const RobotModel& robot);
+
+// From the start of the trial with the profile `parity`; one robot in one engine, used again and again. Not
 // thread-safe.
 class TrialGround {
  public:
   // Throws std::invalid_argument and MissingError as make_backend.
-  TrialGround(const std::string& engine, std::shared_ptr<const RobotModel> robot);
+  // `dt`: physics step [s]; 0: the profile's.
+  TrialGround(const std::string& engine, std::shared_ptr<const RobotModel> robot, double dt = 0.0);
   // `posture`: joints in which it begins, by name; the others are neutral. Ends where it falls or diverges.
   TrialResult run(Controller& controller, const TrialTask& task, const std::map<std::string, double>& posture);
 

@@ -46,7 +46,10 @@ class ControllerAuditCommand : public ::testing::Test {
 TEST_F(ControllerAuditCommand, EndsWellWhereNothingIsNamed) {
   const Answer answer = audit(read_file(kDescriptor));
   EXPECT_EQ(answer.code, 0) << answer.err;
-  EXPECT_THAT(answer.out, AllOf(HasSubstr("L2 ok  forward"), HasSubstr("Nothing is named")));
+  EXPECT_THAT(answer.out, AllOf(HasSubstr("L2 ok  forward"), HasSubstr("Nothing is named"),
+                                HasSubstr("explicit law holds up to         14 ms (left_knee_joint) with the card's "
+                                          "armature, 8.2 ms (left_knee_joint) without"),
+                                HasSubstr("mujoco at 2 ms, of the profile parity")));
 }
 
 TEST_F(ControllerAuditCommand, EndsWithOneWhereASlipIsNamed) {

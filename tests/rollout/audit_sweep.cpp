@@ -29,7 +29,9 @@ AuditSubject subject_of(const std::string& name) {
   subject.descriptor = load_descriptor(name);
   subject.robot = load_shared_robot(card_path(subject.descriptor.robot));
   const std::string path = find_network(subject.descriptor);
-  subject.make = controllers_of_network(subject.robot, load_network_file(path).make, path);
+  const NetworkFile network = load_network_file(path);
+  subject.make = controllers_of_network(subject.robot, network.make, path);
+  subject.physics = trial_physics(subject.descriptor, network.metadata, *subject.robot);
   return subject;
 }
 

@@ -23,6 +23,31 @@ TEST(Trial, IsToldWhatTheDescriptorTakes) {
   EXPECT_EQ(trial_tasks(load_descriptor("twist2")).size(), 1U);  // a tracker stands
 }
 
+TEST(TrialPhysics, IsOfTheDescriptorElseOfTheNetworkElseOfTheProfile) {
+  const Metadata metadata = {{"experiment_config", R"({"simulator": {"config": {"sim": {"fps": 200}}}})"}};
+  Descriptor descriptor = load_descriptor("rl_gym");
+  const auto robot = load_shared_robot(card_path(descriptor.robot));
+  const TrialPhysics plain = trial_physics(descriptor, {}, *robot);
+  EXPECT_EQ(plain.dt, 0.0);
+  EXPECT_EQ(plain.height, robot->standing_height);
+  const TrialPhysics of_file = trial_physics(descriptor, metadata, *robot);
+  EXPECT_DOUBLE_EQ(of_file.dt, 0.005);
+  descriptor.own_physics = OwnPhysics{.dt = 0.001, .height = 0.7};
+  const TrialPhysics own = trial_physics(descriptor, metadata, *robot);
+  EXPECT_DOUBLE_EQ(own.dt, 0.001);
+  EXPECT_DOUBLE_EQ(own.height, 0.7);
+  descriptor.own_physics->dt = 0.003;
+  const TrialPhysics odd = trial_physics(descriptor, metadata, *robot);
+  EXPECT_EQ(odd.dt, 0.0);
+  for (const TrialPhysics& each : {plain, of_file, own, odd}) EXPECT_SENTENCE(each.dt_from + "; " + each.height_from);
+}
+
+TEST(TrialPhysics, AFileThatSaysItOtherwiseSaysNothing) {
+  for (const char* config : {"", "{}", "[1]", "simulator: {config: {sim: {fps: many}}}", "simulator: 3", "{{"})
+    EXPECT_FALSE(physics_step_of({{"experiment_config", config}}).has_value()) << config;
+  EXPECT_FALSE(physics_step_of({}).has_value());
+}
+
 TEST(Trial, OfAPdControllerEndsWhereItFalls) {
   if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
   const auto robot = load_shared_robot(card_path("g1"));
