@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <vector>
@@ -101,6 +102,16 @@ inline bool arm_by_its_word(OwnProcess& guard) {
   const std::size_t begin = said.find("type '") + 6;
   guard.type(said.substr(begin, said.find('\'', begin) - begin));
   return true;
+}
+
+// Whether the guard says that this machine held it, or the twin, up. `but`: the cause that the trial itself brings
+// about.
+inline bool held_up(const std::string& said, const std::string& but) {
+  constexpr const char* kLate[] = {"loop_late", "state_age", "remote_age", "dead_man", "odometry_age", "executor_age"};
+  return std::ranges::any_of(kLate, [&](const std::string& cause) {
+    return cause != but && (said.find("(" + cause + ")") != std::string::npos ||
+                            said.find("lately missing: " + cause) != std::string::npos);
+  });
 }
 
 }  // namespace duet::test

@@ -19,6 +19,7 @@
 namespace duet {
 namespace {
 
+using test::held_up;
 using test::OwnProcess;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -70,16 +71,6 @@ struct ArmedTrial {
   bool armed = false, runs = false;
   bool late = false;  // a planner took longer to begin than a hold lasts
 };
-
-// Whether the guard says that this machine held it, or the twin, up. `but`: the cause that the trial itself brings
-// about.
-bool held_up(const std::string& said, const std::string& but) {
-  constexpr const char* kLate[] = {"loop_late", "state_age", "remote_age", "dead_man", "odometry_age", "executor_age"};
-  return std::ranges::any_of(kLate, [&](const std::string& cause) {
-    return cause != but && (said.find("(" + cause + ")") != std::string::npos ||
-                            said.find("lately missing: " + cause) != std::string::npos);
-  });
-}
 
 // Until a trial runs and what follows happens. `cause`: that the guard then gives. A trial that the machine did not
 // hold up has to succeed.
