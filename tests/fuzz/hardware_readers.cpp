@@ -1,17 +1,22 @@
 // Bytes that reach the guard of a real robot from outside: messages of sockets and topics, configurations, logs.
+#include <fmt/format.h>
+
 #include <cstring>
 
 #include "duet/core/file.h"
+#include "duet/core/json.h"
 #include "duet/core/numbers.h"
 #include "duet/core/recording.h"
 #include "duet/core/require.h"
 #include "duet/hardware/executors/sport_executor.h"
+#include "duet/hardware/guard/camera_calibration.h"
 #include "duet/hardware/guard/guard_message.h"
 #include "duet/hardware/guard/person_log.h"
 #include "duet/hardware/guard/robot_connection.h"
 #include "duet/hardware/log/guard_health.h"
 #include "duet/hardware/log/limiter_replay.h"
 #include "duet/hardware/log/run_log.h"
+#include "duet/hardware/safety/checklist.h"
 #include "duet/hardware/safety/limiter_setup_json.h"
 #include "duet/hardware/twin/fakes.h"
 #include "duet/hardware/wire/odometry_source.h"
@@ -214,14 +219,63 @@ std::string health_sample(unsigned seed) {
 
 void read_health(std::string_view bytes) { (void)parse_health(bytes, "x"); }
 
+// Three places and the log of who stood there, in the frame of the base.
+std::string calibration_sample(unsigned seed) {
+  constexpr double kMarks[][2] = {{1.5, 0.0}, {2.5, 0.8}, {2.5, -0.8}};
+  std::string yaml = "schema: duet.calibration/1\nlog: person.dpj\nheight: 0.74\nplaces:\n";
+  std::vector<RecordedEstimate> log;
+  for (const auto& [ahead, left] : kMarks) {
+    const double begin = 0.1 * static_cast<double>(log.size());
+    yaml += fmt::format("  - {{at: [{}, {}], seconds: [{:.2f}, {:.2f}]}}\n", ahead, left, begin - 0.05, begin + 0.45);
+    for (int k = 0; k < 5; ++k) {
+      PersonEstimate estimate{.sequence = log.size() + 1, .stamp = 0.1 * static_cast<double>(log.size()), .seen = true};
+      estimate.joints.colwise() = Eigen::Vector3d(ahead, left + 1e-3 * (seed % 5), -0.66);
+      log.push_back(recorded(estimate));
+    }
+  }
+  return yaml + std::string(kSeparator) + person_log(log);
+}
+
+void read_calibration(std::string_view bytes) {
+  const std::vector<std::string_view> files = parts(bytes, 2);
+  scratch_file("person.dpj", files[1]);
+  const CameraCalibration found = calibrate_camera(read_marked_places(scratch_file("places.yaml", files[0])), "x");
+  if (!found.X_BC.p.allFinite() || !std::isfinite(found.rms)) throw std::logic_error("a camera that is nowhere");
+}
+
+// Filled in up to an item.
+std::string checklist_sample(unsigned seed) {
+  std::string text = empty_checklist("E21-1", std::string(64, 'a'), std::string(64, 'b'), 1795860900.0);
+  const std::vector<std::string> names = checklist_names();
+  text.replace(text.find("who: \"\""), 7, "who: A. Name");
+  for (std::size_t k = 0; k < std::min<std::size_t>(seed / 64 + 1, names.size()); ++k) {
+    const std::size_t done = text.find("no", text.find(names[k] + ": {"));
+    text.replace(done, 2, "yes");
+    if (const std::size_t value = text.find("\"\"", done); value < text.find('\n', done))
+      text.insert(value + 1, "41.5");
+  }
+  return text;
+}
+
+void read_checklist_form(std::string_view bytes) {
+  (void)dumped(checklist_json(parse_checklist(std::string(bytes), "form.yaml")));  // as a log keeps it
+}
+
 }  // namespace
 
 std::vector<Reader> hardware_readers() {
-  return {{"lcm_message", lcm_sample, read_lcm},           {"guard_message", guard_sample, read_guard},
-          {"person_estimate", person_sample, read_person}, {"external_pose", external_sample, read_external},
-          {"low_state", state_sample, read_low_state},     {"sport_answer", sport_sample, read_sport},
-          {"robot_config", config_sample, read_config},    {"limiter_setup", setup_sample, read_setup},
-          {"guard_health", health_sample, read_health},    {"run_log", log_sample, read_log}};
+  return {{"lcm_message", lcm_sample, read_lcm},
+          {"guard_message", guard_sample, read_guard},
+          {"person_estimate", person_sample, read_person},
+          {"external_pose", external_sample, read_external},
+          {"low_state", state_sample, read_low_state},
+          {"sport_answer", sport_sample, read_sport},
+          {"robot_config", config_sample, read_config},
+          {"limiter_setup", setup_sample, read_setup},
+          {"guard_health", health_sample, read_health},
+          {"run_log", log_sample, read_log},
+          {"calibration", calibration_sample, read_calibration},
+          {"checklist", checklist_sample, read_checklist_form}};
 }
 
 }  // namespace duet::fuzz

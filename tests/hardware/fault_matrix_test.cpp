@@ -1,5 +1,5 @@
-// Faults on the way between twin and guard: each reaches its state within the time of its table, and every frame that
-// was sent is inside its limits.
+// Faults on the way between twin and guard, beside those of fault_table_test.cpp: each reaches its state within the
+// time of its table, and every frame that was sent is inside its limits.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,13 +10,17 @@
 #include <vector>
 
 #include "duet/core/numbers.h"
-#include "tests/hardware/guarded_twin.h"
+#include "tests/hardware/wire_faults.h"
 
 namespace duet {
 namespace {
 
+using test::delayed;
+using test::dropped;
+using test::flipped;
+using test::Frames;
 using test::GuardedTwin;
-using Frames = GuardedTwin::Frames;
+using test::in_each;
 constexpr double kTick = GuardedTwin::kDt;
 constexpr double kMostStep = 0.5 * kTick + 1e-6;  // of a target between two frames [rad]
 
@@ -26,98 +30,10 @@ void expect_inside(const GuardedTwin& robot, const char* name) {
   EXPECT_EQ(robot.twin.refused_frames(), 0) << name;
 }
 
-struct WireFault {
-  const char* name;
-  std::function<void(Frames&)> spoil;
-  SafetyState reached;
-  StopCause cause;
-  double within;  // [s]
-};
-
-std::function<void(Frames&)> in_each(const std::function<void(LowStateFrame&)>& change) {
-  return [change](Frames& frames) {
-    for (LowStateFrame& frame : frames) {
-      change(frame);
-      seal(frame);
-    }
-  };
-}
-
-std::function<void(Frames&)> flipped(int every) {
-  return [every, k = 0](Frames& frames) mutable {
-    if (++k % every == 0)
-      for (LowStateFrame& frame : frames) reinterpret_cast<unsigned char*>(&frame)[100] ^= 4;
-  };
-}
-
-std::function<void(Frames&)> frozen() {
-  return [tick = 0u](Frames& frames) mutable {
-    for (LowStateFrame& frame : frames) {
-      if (tick == 0u) tick = frame.tick;
-      frame.tick = tick;
-      seal(frame);
-    }
-  };
-}
-
-// Everything comes `ticks` late from now on.
-std::function<void(Frames&)> delayed(std::size_t ticks) {
-  return [ticks, waiting = Frames()](Frames& frames) mutable {
-    waiting.insert(waiting.end(), frames.begin(), frames.end());
-    frames.clear();
-    if (waiting.size() <= ticks) return;
-    frames.push_back(waiting.front());
-    waiting.pop_front();
-  };
-}
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
-
-std::vector<WireFault> wire_faults() {
-  using S = SafetyState;
-  using C = StopCause;
-  return {{"all dropped", [](Frames& f) { f.clear(); }, S::kHold, C::kStateAge, 0.020},
-          {"50 ms late", delayed(25), S::kHold, C::kStateAge, 0.020},
-          {"500 ms late", delayed(250), S::kHold, C::kStateAge, 0.020},
-          {"every bit flipped", flipped(1), S::kHold, C::kBadStates, 0.050},
-          {"frozen tick", frozen(), S::kHold, C::kBadStates, 0.050},
-          {"tick back", in_each([](LowStateFrame& f) { f.tick -= 100; }), S::kHold, C::kBadStates, 0.050},
-          {"nan angle", in_each([](LowStateFrame& f) { f.motor[5].q = kNan; }), S::kHold, C::kBadStates, 0.050},
-          {"inf speed", in_each([](LowStateFrame& f) { f.motor[5].dq = kInf; }), S::kHold, C::kBadStates, 0.050},
-          {"nan torque", in_each([](LowStateFrame& f) { f.motor[5].tau_est = kNan; }), S::kHold, C::kBadStates, 0.050},
-          {"nan imu", in_each([](LowStateFrame& f) { f.imu.quaternion[0] = kNan; }), S::kHold, C::kBadStates, 0.050},
-          {"nan gyro", in_each([](LowStateFrame& f) { f.imu.gyroscope[0] = kNan; }), S::kHold, C::kBadStates, 0.050},
-          {"huge speed", in_each([](LowStateFrame& f) { f.motor[5].dq = 1e30f; }), S::kHold, C::kJointSpeed, 0.004},
-          {"wrong mode_machine", in_each([](LowStateFrame& f) { f.mode_machine = 6; }), S::kHold, C::kMode, 0.0},
-          {"wrong mode_pr", in_each([](LowStateFrame& f) { f.mode_pr = 1; }), S::kHold, C::kMode, 0.0},
-          {"remote lost", in_each([](LowStateFrame& f) { std::fill_n(f.wireless_remote, kRemoteBytes, 0); }), S::kHold,
-           C::kRemoteAge, 0.2}};
-}
-
-TEST(FaultMatrix, EachFaultOfTheWireReachesItsState) {
-  for (const WireFault& fault : wire_faults()) {
-    GuardedTwin robot;
-    robot.start();
-    ASSERT_EQ(robot.state(), SafetyState::kRun) << fault.name;
-    robot.spoil = fault.spoil;
-    const double taken = robot.time_to_leave(SafetyState::kRun);
-    EXPECT_EQ(robot.state(), fault.reached) << fault.name;
-    EXPECT_EQ(robot.cause(), fault.cause) << fault.name << ": " << stop_cause_name(robot.cause());
-    EXPECT_LE(taken, fault.within + 2.5 * kTick) << fault.name;
-    robot.run_for(1.0);
-    EXPECT_EQ(robot.guard.status().limited.root.forward, 0.0) << fault.name;
-    expect_inside(robot, fault.name);
-  }
-}
-
 // Less than what holds: it runs on, and nothing bad leaves.
 TEST(FaultMatrix, RunsOnThroughALittle) {
   const std::vector<std::pair<const char*, std::function<void(Frames&)>>> little = {
-      {"5 % dropped",
-       [random = Random(19, 8)](Frames& f) mutable {
-         if (random.chance(0.05)) f.clear();
-       }},
+      {"5 % dropped", dropped(0.05)},
       {"half dropped",
        [k = 0](Frames& f) mutable {
          if (++k % 2 == 0) f.clear();
@@ -143,33 +59,6 @@ TEST(FaultMatrix, RunsOnThroughALittle) {
     EXPECT_EQ(robot.state(), SafetyState::kRun) << name << ": " << stop_cause_name(robot.cause());
     EXPECT_NEAR(robot.velocity.last.forward, 0.1, 1e-6) << name;
     expect_inside(robot, name);
-  }
-}
-
-TEST(FaultMatrix, EachConditionOfTheRobotReachesItsState) {
-  struct Case {
-    const char* name;
-    std::function<void(TwinCondition&)> change;
-    SafetyState reached;
-    StopCause cause;
-  };
-  for (const Case& c :
-       {Case{"hot casing", [](TwinCondition& t) { t.casing = 88.0; }, SafetyState::kHold, StopCause::kTemperature},
-        Case{"hot winding", [](TwinCondition& t) { t.winding = 125.0; }, SafetyState::kHold, StopCause::kTemperature},
-        Case{"leaning", [](TwinCondition& t) { t.roll = 0.6; }, SafetyState::kHold, StopCause::kTilt},
-        Case{"fallen", [](TwinCondition& t) { t.roll = 1.5; }, SafetyState::kDamp, StopCause::kTilt},
-        Case{"motor error", [](TwinCondition& t) { t.motor_error = true; }, SafetyState::kDamp, StopCause::kMotorError},
-        Case{"joint speed", [](TwinCondition& t) { t.joint_speed = 12.0; }, SafetyState::kHold, StopCause::kJointSpeed},
-        Case{"gyro", [](TwinCondition& t) { t.gyro = 7.0; }, SafetyState::kHold, StopCause::kGyro}}) {
-    GuardedTwin robot;
-    robot.start();
-    c.change(robot.twin.condition);
-    const double within = c.cause == StopCause::kJointSpeed ? 4.5 : 2.5;  // three samples
-    EXPECT_LE(robot.time_to_leave(SafetyState::kRun), within * kTick) << c.name;
-    EXPECT_EQ(robot.state(), c.reached) << c.name;
-    EXPECT_EQ(robot.cause(), c.cause) << c.name;
-    robot.run_for(1.0);
-    expect_inside(robot, c.name);
   }
 }
 

@@ -76,6 +76,7 @@ struct GuardedTwin {
   }
 
   static constexpr double kDt = 0.002;
+  static constexpr double kMostStep = 0.5 * kDt + 1e-6;  // of a target between two frames [rad]
   using Frames = std::deque<LowStateFrame>;
 
   // The robot's half of a tick.
@@ -100,7 +101,9 @@ struct GuardedTwin {
   void plan() {
     ++message.sequence;
     message.command.stamp = now;
-    guard.receive(message, now);
+    PlannerMessage sent = message;
+    if (spoil_plan) spoil_plan(sent);
+    guard.receive(sent, now);
   }
   void see() {
     ++person.sequence;
@@ -157,6 +160,7 @@ struct GuardedTwin {
     const bool follows = has_last && !last_damps;
     const double rate = follows ? motor.q - last.motor[j].q : std::numeric_limits<double>::quiet_NaN();
     if (follows) largest_step = std::max(largest_step, std::abs(rate));
+    if (follows && std::abs(rate) > kMostStep) ++fast_targets;
     if (follows && std::isfinite(rates[j])) largest_change = std::max(largest_change, std::abs(rate - rates[j]));
     rates[j] = rate;
   }
@@ -168,11 +172,13 @@ struct GuardedTwin {
   PlannerMessage message;
   PersonMessage person;
   std::function<void(Frames&)> spoil;
+  std::function<void(PlannerMessage&)> spoil_plan;
   bool plans = true, sees = true, measures = true;
   double now = 1000.0;
   long ticks = 0;
   // Counts over all frames that were sent.
   long bad_frames = 0;
+  long fast_targets = 0;        // beyond kMostStep
   double largest_step = 0.0;    // of a target between two frames [rad]
   double largest_change = 0.0;  // of that step [rad]
   std::array<double, kG1Motors> rates{};
