@@ -199,18 +199,22 @@ class Loan {
 
 class DdsSportWire final : public SportWire {
  public:
-  explicit DdsSportWire(const DdsPlace& place)
-      : participant_(place), sport_(open(Service::kSport)), arm_(open(Service::kArm)), others_(participant_) {}
+  DdsSportWire(const DdsPlace& place, std::span<const Service> services) : participant_(place), others_(participant_) {
+    for (const Service service : services) calls_[static_cast<std::size_t>(service)] = open(service);
+  }
 
-  bool take(RpcResponse& response) override { return take(sport_, response) || take(arm_, response); }
+  bool take(RpcResponse& response) override {
+    return std::ranges::any_of(calls_,
+                               [&](const Calls& calls) { return calls.responses != 0 && take(calls, response); });
+  }
   bool request(const RpcRequest& request) override {
     RequestSample sample{};
     sample.header.identity.id = request.id;
     sample.header.identity.api_id = static_cast<std::int64_t>(request.call);
     parameter_ = request.parameter;
     sample.parameter = parameter_.data();
-    const Calls& calls = service_of(request.call) == Service::kArm ? arm_ : sport_;
-    return dds_write(calls.requests, &sample) == DDS_RETCODE_OK;
+    const Calls& calls = calls_[static_cast<std::size_t>(service_of(request.call))];
+    return calls.requests != 0 && dds_write(calls.requests, &sample) == DDS_RETCODE_OK;
   }
   int arm_writers() override { return others_.of(kArmTopic); }
   void open_arms() override {
@@ -245,7 +249,7 @@ class DdsSportWire final : public SportWire {
   }
 
   Participant participant_;
-  Calls sport_, arm_;
+  std::array<Calls, kServiceNames.size()> calls_{};
   dds_entity_t arms_ = 0;
   WriterCount others_;
   std::array<char, 96> parameter_{};
@@ -304,7 +308,9 @@ class DdsServices final : public ServicesWire {
 
 }  // namespace
 
-std::unique_ptr<SportWire> open_sport_wire(const DdsPlace& place) { return std::make_unique<DdsSportWire>(place); }
+std::unique_ptr<SportWire> open_sport_wire(const DdsPlace& place, std::span<const Service> services) {
+  return std::make_unique<DdsSportWire>(place, services);
+}
 
 std::unique_ptr<ServicesWire> open_services(const DdsPlace& place, std::span<const Service> services) {
   check_twin_place(place);

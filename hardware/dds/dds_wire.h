@@ -28,7 +28,8 @@ std::string dds_type_digest(const std::string& type);
 // as a stand-in that serves them.
 
 // Opens the wire as open_robot_wire does.
-std::unique_ptr<SportWire> open_sport_wire(const DdsPlace& place);
+// `services`: that are called; the arm topic is there with any.
+std::unique_ptr<SportWire> open_sport_wire(const DdsPlace& place, std::span<const Service> services);
 
 // The other side, in a twin's domain.
 class ServicesWire {

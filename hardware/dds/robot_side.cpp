@@ -47,7 +47,8 @@ void RobotSide::make_executor(const RobotConfig& config, const RobotSideOptions&
   if (kind == ExecutorKind::kHomieLcm) {
     executor_ = std::make_unique<HomieExecutor>(config.lcm, config.limits.height, options.period);
   } else if (is_makers(kind)) {
-    sport_ = open_sport_wire(config.place());
+    constexpr Service kCalled[] = {Service::kSport, Service::kArm};
+    sport_ = open_sport_wire(config.place(), kCalled);
     const int action = config.arm_action.empty() ? 0 : arm_preset(config.arm_action).id;
     executor_ = std::make_unique<SportExecutor>(*sport_, options.period, action);
   } else {
@@ -61,6 +62,10 @@ void RobotSide::make_executor(const RobotConfig& config, const RobotSideOptions&
     const int expected = options.commands ? 0 : expected_writers(config.executor);
     executor_ = std::make_unique<MotorExecutor>(*wire_, *velocity_, expected);
   }
+  if (!options.commands || is_makers(kind)) return;
+  constexpr Service kAsked[] = {Service::kMotionSwitcher};
+  sport_ = open_sport_wire(config.place(), kAsked);
+  mode_.emplace(*sport_);
 }
 
 }  // namespace duet

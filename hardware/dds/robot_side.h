@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "duet/hardware/dds/dds_wire.h"
@@ -25,6 +26,8 @@ class RobotSide {
 
   RobotConnection& connection() { return *connection_; }
   Executor& executor() { return *executor_; }
+  // Null where the maker's own walking is the executor, and where nothing is commanded.
+  ModeWatch* maker_mode() { return mode_ ? &*mode_ : nullptr; }
 
  private:
   void make_odometry(const RobotConfig& config, const RobotSideOptions& options);
@@ -32,6 +35,7 @@ class RobotSide {
 
   std::unique_ptr<RobotWire> wire_;
   std::unique_ptr<SportWire> sport_;
+  std::optional<ModeWatch> mode_;
   std::unique_ptr<VelocitySink> velocity_;
   std::unique_ptr<OdometryReader> odometry_;
   std::unique_ptr<Executor> executor_;

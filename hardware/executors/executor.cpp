@@ -163,6 +163,11 @@ std::string arming_refusal(const ArmingFacts& facts) {
     return fmt::format("the disk of the log has {:.2f} GB left, expected at least 1", 1e-9 * facts.free_log_bytes);
   if (!facts.executor_complaint.empty())
     return fmt::format("executor '{}': {}", executor_name(facts.executor), facts.executor_complaint);
+  if (!is_makers(facts.executor) && !facts.running_mode.empty())
+    return fmt::format(
+        "the maker's mode '{}' runs and owns the motors, says its motion_switcher: release it with the remote control "
+        "before executor '{}' commands them",
+        excerpt(facts.running_mode), executor_name(facts.executor));
   return operator_refusal(facts);
 }
 

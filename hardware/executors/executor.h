@@ -90,6 +90,7 @@ struct ArmingFacts {
   ExecutorKind executor = ExecutorKind::kTwin;
   OdometrySource odometry = OdometrySource::kNone;
   std::string executor_complaint;  // what is wrong with it; empty: nothing
+  std::string running_mode;        // of the maker's, that owns the motors; empty: none, or nobody says so
   bool asked_to_arm = false;       // on the command line
   bool dry_run = false;
   ContactLimits contact_limits;

@@ -14,7 +14,7 @@ namespace duet {
 namespace {
 
 constexpr double kVelocityPeriod = 0.1, kVelocityLasts = 0.3;  // [s]
-constexpr double kArmPeriod = 0.02, kDampPeriod = 0.2, kAskPeriod = 0.1;
+constexpr double kArmPeriod = 0.02, kDampPeriod = 0.2, kAskPeriod = 0.1, kModePeriod = 1.0;
 constexpr double kWeightRate = 0.2;  // of the maker's example [1/s]
 constexpr int kArmsFrom = 15, kWeightMotor = 29;
 constexpr int kMostResponses = 16;  // of a tick
@@ -61,6 +61,17 @@ std::string SportExecutor::complaint() const {
     return fmt::format("the maker's machine is in state {}, expected {}, {} or {} (walking)", fsm_, kFsmStart,
                        kFsmWaistStart, kFsmRun);
   return "";
+}
+
+void ModeWatch::poll(double now) {
+  RpcResponse response;
+  for (int k = 0; k < kMostResponses && wire_.take(response); ++k) {
+    const bool answers = response.code == 0 && response.api == static_cast<std::int64_t>(ServiceCall::kCheckMode);
+    if (std::optional<std::string> name = answers ? name_of(response.data) : std::nullopt) mode_ = std::move(name);
+  }
+  if (now - asked_at_ < kModePeriod) return;
+  asked_at_ = now;
+  wire_.request(read_request(next_id_++, ServiceCall::kCheckMode));
 }
 
 void SportExecutor::open() {

@@ -80,6 +80,22 @@ class SportWire {
   virtual bool write_arms(const LowCommandFrame& frame) = 0;
 };
 
+// Which mode of the maker's runs and owns the motors, asked of its motion_switcher once a second; read only. One owner,
+// one thread.
+class ModeWatch {
+ public:
+  explicit ModeWatch(SportWire& wire) : wire_(wire) {}  // refers to it
+  void poll(double now);
+  // The last answer: "" where none runs; none where nobody has answered.
+  [[nodiscard]] const std::optional<std::string>& mode() const { return mode_; }
+
+ private:
+  SportWire& wire_;
+  std::optional<std::string> mode_;
+  double asked_at_ = kNever;
+  std::int64_t next_id_ = 1;
+};
+
 class SportExecutor final : public Executor {
  public:
   // `period` of the guard's ticks [s]. `action`: number of a preset arm action (executor `vendor-arm-action`), which

@@ -14,6 +14,7 @@ constexpr double kSteerGain = 1.0;       // [1/s]
 constexpr double kMostSteering = 0.3;    // [rad/s]
 constexpr double kSteersFrom = 0.3;      // nearer than this the bearing says little [m]
 constexpr double kTurnFrom = 0.10;       // a smaller error of the heading is left alone [rad]
+constexpr double kStepTurnFrom = 0.14;   // the same of one that steps: half of its least turn [rad]
 constexpr double kStepCoast = 0.14;      // by which one that steps turns on once it is told to stand [rad]
 constexpr double kSmoothCoast = 0.03;    // the same of one that answers every command [rad]
 constexpr double kShort = 0.07;          // of the goal: the place that it keeps while it turns [m]
@@ -22,6 +23,7 @@ constexpr double kMostKeeping = 0.10;    // [m/s]
 constexpr double kLeastDistance = 0.02;  // below which a direction from the goal says little [m]
 constexpr double kArrived = 0.14;        // [m]
 constexpr double kStopsAgain = 0.12;     // instead of kBrakeDistance where it has stopped too short [m]
+constexpr double kStepsOn = 0.04;        // by which one that steps drifts on after it has braked [m]
 constexpr int kMostTries = 3;            // walks to one goal
 constexpr int kLeastTurn = 15;           // ticks; in fewer HOMIE does not begin a step
 constexpr int kSettle = 40;              // ticks until it stands after a burst
@@ -91,11 +93,13 @@ void GoalWalk::decide(const Sight& sight, const RobotState& measured, const Pose
     place_ = measured.X_WB.p.head<2>();
     return enter(Phase::kFacing);
   }
-  if (std::abs(sight.turn) <= kTurnFrom) return;
+  if (std::abs(sight.turn) <= (least_.yaw > 0.0 ? kStepTurnFrom : kTurnFrom)) return;
   side_ = std::copysign(1.0, sight.turn);
-  // On the side of the goal on which it stopped, and as near as it should be.
-  const Eigen::Vector2d from_goal = (measured.X_WB.p - goal.p).head<2>();
-  place_ = goal.p.head<2>() + kShort / std::max(distance, kLeastDistance) * from_goal;
+  // As near as it should be, on the side of the goal on which its walk began: where it stopped may be at the goal.
+  const Eigen::Vector2d to = goal.p.head<2>();
+  const bool has_walked = tries_ > 0 && (place_ - to).norm() > kLeastDistance;
+  const Eigen::Vector2d from_goal = (has_walked ? place_ : measured.X_WB.p.head<2>()) - to;
+  place_ = to + kShort / std::max(from_goal.norm(), kLeastDistance) * from_goal;
   enter(Phase::kAligning);
 }
 
@@ -117,7 +121,8 @@ void GoalWalk::face(const Sight& sight, const RobotState& measured, VelocityComm
 }
 
 void GoalWalk::walk(const Sight& sight, VelocityCommand& command) {
-  if (sight.residual.x() <= (tries_ > 0 ? kStopsAgain : kBrakeDistance)) {
+  const double first = kBrakeDistance + (least_.forward > 0.0 ? kStepsOn : 0.0);
+  if (sight.residual.x() <= (tries_ > 0 ? kStopsAgain : first)) {
     enter(Phase::kBraking);
     ++tries_;
     return brake(sight, command);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "duet/core/require.h"
+#include "duet/hardware/safety/foot_load.h"
 #include "duet/robots/dynamics.h"
 #include "duet/robots/roles.h"
 
@@ -17,12 +18,8 @@ namespace {
 constexpr long kLeastStates = 500;
 constexpr double kMostMoved = 0.15;    // of a joint while it stands [rad]
 constexpr double kLeastCarried = 0.5;  // share of the card's mass
-constexpr double kStraight = 0.02;     // least singular value of a leg's Jacobian
 constexpr double kLoad = 0.5;          // from which a difference is said to lie somewhere [kg]
-constexpr int kLegJoints = 6;
 constexpr double kDegree = std::numbers::pi / 180.0;
-
-using Wrench = Eigen::Matrix<double, 6, 1>;  // force, and moment about the base's origin; W
 
 struct Sole {
   Eigen::Vector3d normal, middle;  // W
@@ -43,35 +40,11 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-// The floor's wrench on a foot: the leg's torques are its weight's less that. g(q) = tau + J^T F at rest.
-Wrench wrench_of_foot(const RobotModel& robot, const Kinematics& kinematics, const std::vector<int>& leg, int foot,
-                      const Eigen::VectorXd& weight, const Eigen::VectorXd& tau) {
-  Eigen::MatrixXd linear(3, 6 + robot.dof()), angular(3, 6 + robot.dof());
-  const Eigen::Vector3d& p_W = kinematics.p_WL(foot);
-  kinematics.point_jacobian(foot, p_W, linear);
-  kinematics.angular_jacobian(foot, angular);
-  Eigen::Matrix<double, 6, 6> J;
-  Wrench carried;
-  for (int k = 0; k < kLegJoints; ++k) {
-    const int joint = leg[static_cast<std::size_t>(k)];
-    J.col(k) << linear.col(6 + joint), angular.col(6 + joint);
-    carried[k] = weight[6 + joint] - tau[joint];
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix<double, 6, 6>> solver(J.transpose(), Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (solver.singularValues()[5] < kStraight)
-    throw std::runtime_error("identification: expected legs with bent knees, found a straight one");
-  Wrench wrench = solver.solve(carried);
-  wrench.tail<3>() += p_W.cross(Eigen::Vector3d(wrench.head<3>()));
-  return wrench;
-}
-
 }  // namespace
 
 StandingIdentification::StandingIdentification(std::shared_ptr<const RobotModel> robot) : robot_(std::move(robot)) {
   require(robot_ != nullptr, "identification: expected a robot, found none");
-  const bool has_legs = robot_->roles.legs[0].size() == kLegJoints && robot_->roles.legs[1].size() == kLegJoints;
-  require(has_legs && soles_of_feet(*robot_).size() == 2,
-          "identification: expected a robot of two legs with six joints and a sole each, found '{}'", robot_->name);
+  (void)FootLoad(robot_);
   q_.setZero(robot_->dof());
   tau_ = q_;
 }
@@ -108,7 +81,8 @@ StandingFindings StandingIdentification::findings() const {
 
   StandingFindings found{.states = states_};
   const std::vector<std::vector<int>> soles = soles_of_feet(*robot_);
-  Wrench floor = Wrench::Zero();
+  FootLoad::Wrench floor = FootLoad::Wrench::Zero();
+  const auto wrenches = FootLoad(robot_).wrenches(state.X_WB, state.q, weight, tau);
   std::array<Sole, 2> feet;
   std::vector<Eigen::Vector3d> all;
   for (std::size_t side = 0; side < 2; ++side) {
@@ -116,8 +90,9 @@ StandingFindings StandingIdentification::findings() const {
     for (const int shape : soles[side]) points.push_back(kinematics.shape_position(shape));
     all.insert(all.end(), points.begin(), points.end());
     feet[side] = plane_of(points);
-    floor +=
-        wrench_of_foot(*robot_, kinematics, robot_->roles.legs[side], robot_->shapes[soles[side][0]].link, weight, tau);
+    if (!wrenches[side])
+      throw std::runtime_error("identification: expected legs with bent knees, found a straight one");
+    floor += *wrenches[side];
   }
   found.card_mass = robot_->total_mass();
   found.mass = floor.z() / kGravity;

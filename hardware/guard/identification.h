@@ -27,7 +27,7 @@ struct StandingFindings {
 
 class StandingIdentification {
  public:
-  // Throws std::invalid_argument for a robot without two legs of six joints and their soles.
+  // Throws as FootLoad does.
   explicit StandingIdentification(std::shared_ptr<const RobotModel> robot);
 
   void see(const RobotReading& reading);

@@ -140,11 +140,14 @@ void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& c
 
 }  // namespace
 
+constexpr double kLongestRamp = 10.0;  // of gains [s]
+
 RobotConfig parse_robot_config(const std::string& text, const std::string& file) {
   const YamlSection top(
       file, parse_yaml(text, file), "robot",
-      {"schema", "robot", "interface", "domain", "mode_machine", "allow_motion", "twin", "person", "limits", "touches",
-       "contact_limits", "executor", "odometry", "arm_action", "lcm", "camera", "network", "checklist"});
+      {"schema", "robot",  "interface", "domain",         "mode_machine", "allow_motion", "twin",
+       "person", "limits", "touches",   "contact_limits", "executor",     "odometry",     "arm_action",
+       "lcm",    "camera", "network",   "checklist",      "gain_ramp",    "arm_gravity"});
   top.require_schema(kRobotSchema);
   RobotConfig config;
   config.permission = {.allow_motion = false,
@@ -156,6 +159,8 @@ RobotConfig parse_robot_config(const std::string& text, const std::string& file)
   read_optional(top, {"twin"}, config.twin);
   read_optional(top, {"person"}, config.person);
   read_optional(top, {"contact_limits"}, config.contact_limits);
+  read_optional(top, {.name = "gain_ramp", .range = {0.0, kLongestRamp}}, config.gain_ramp);
+  read_optional(top, {"arm_gravity"}, config.arm_gravity);
   if (top.has("limits")) read_fields(file, top.node("limits"), "limits", hardware_limit_fields(), config.limits);
   read_touches(top, config.touches);
   read_executor(top, config);
@@ -201,6 +206,9 @@ GuardSetup guard_setup(const RobotConfig& config, bool dry_run) {
   setup.odometry = config.odometry;
   const bool answers = config.executor == ExecutorKind::kHomieLcm || is_makers(config.executor);
   setup.rules.executor_answers = !dry_run && answers;
+  setup.rules.stands_alone = answers;
+  setup.gain_ramp = config.gain_ramp;
+  setup.arm_gravity = config.arm_gravity;
   return setup;
 }
 

@@ -89,6 +89,8 @@ struct RobotConfig {
   NetworkPlace network;  // where planners and estimators of other computers reach the guard
   bool has_network = false;
   ChecklistDemand checklist;
+  double gain_ramp = GuardSetup{}.gain_ramp;  // as in GuardSetup
+  bool arm_gravity = GuardSetup{}.arm_gravity;
 
   [[nodiscard]] DdsPlace place() const { return {permission.domain, permission.interface}; }
 };

@@ -11,8 +11,11 @@ namespace {
 
 // Keys of the remote control.
 constexpr RemoteKey kDeadMan = RemoteKey::kR1, kStandUp = RemoteKey::kStart, kRun = RemoteKey::kA;
-// Looking for other writers takes longer than a tick should: ten times a second.
+// Looking for other writers takes longer than a tick should: ten times a second, as what the feet carry is weighed.
 constexpr double kWritersPeriod = 0.1;
+constexpr double kWeighShare = 0.2;  // of the newest weighing in what counts: half a second of a gait
+// Share of their stiffness that joints begin with, above 0: no stiffness is damping.
+constexpr double kFirstGains = 0.1;
 // Angle from the stance at which the robot counts as standing [rad].
 constexpr double kStanding = 0.05;
 constexpr double kWalkerPeriod = 0.02;  // [s]
@@ -39,6 +42,8 @@ const GuardSetup& checked(const GuardSetup& setup) {
   for (const Eigen::VectorXd* values : {&setup.stance.q_target, &setup.stance.kp, &setup.stance.kd})
     require(values->size() == kG1Motors && values->allFinite(),
             "guard: expected a stance of {} finite targets and gains, found another", kG1Motors);
+  require(setup.gain_ramp >= 0.0 && std::isfinite(setup.gain_ramp),
+          "guard: expected a gain_ramp of at least 0 s, found {}", setup.gain_ramp);
   return setup;
 }
 
@@ -69,6 +74,7 @@ RobotGuard::RobotGuard(const GuardSetup& setup, FrameTransport& transport, Veloc
       velocity_(velocity),
       limiter_(setup_.limiter),
       contact_(contact_watch(setup_.limiter)),
+      feet_(setup_.limiter.robot),
       speed_limits_(speed_limits(*setup_.limiter.robot)),
       watch_(*setup_.limiter.robot, speed_limits_) {
   setup_.rules.person_present = setup_.limiter.person;
@@ -238,17 +244,27 @@ void RobotGuard::check_robot() {
   if (ticks_to_writers_-- <= 0) {
     ticks_to_writers_ = static_cast<int>(kWritersPeriod / setup_.limiter.dt);
     next_.foreign_writer = transport_.foreign_writers() > 0;
+    weigh();
   }
+  next_.health.carried = carried_;
+}
+
+// What the feet carry now, with the torques of gravity in the tick before.
+void RobotGuard::weigh() {
+  if (!reading_.any) return;
+  const double now = feet_.carried(reading_.state, contact_.weight(), reading_.tau);
+  carried_ = std::isnan(carried_) ? now : carried_ + kWeighShare * (now - carried_);
 }
 
 // Every joint to its stance, from where it was measured when the robot was told to stand, as fast as the distance to a
-// person allows. It stands once all are there and none would stop faster than it may.
+// person allows. It stands once all are there with their full gains, and none would stop faster than it may.
 void RobotGuard::follow_stance() {
   if (!follows_stance_)
     for (int j = 0; j < kG1Motors; ++j) stance_[j] = {reading_.state.q[j], 0.0};
+  raise_gains();
   follows_stance_ = true;
   AxisClamps clamps;
-  next_.stands = true;
+  next_.stands = gains_ >= 1.0;
   for (int j = 0; j < kG1Motors; ++j) {
     const double target = setup_.stance.q_target[j];
     AxisBounds bounds = stance_bounds(limiter_, j);
@@ -260,8 +276,30 @@ void RobotGuard::follow_stance() {
     next_.stands = next_.stands && there;
     joints_.q_target[j] = stance_[j].value;
   }
-  joints_.kp = setup_.stance.kp;
+  joints_.kp = gains_ * setup_.stance.kp;
   joints_.kd = setup_.stance.kd;
+  joints_.tau_ff.setZero();
+}
+
+// Joints that were damped get their stiffness by and by; their damping at once.
+void RobotGuard::raise_gains() {
+  if (!follows_stance_)
+    gains_ = setup_.gain_ramp > 0.0 ? kFirstGains : 1.0;
+  else
+    gains_ = std::min(gains_ + (1.0 - kFirstGains) * setup_.limiter.dt / setup_.gain_ramp, 1.0);
+}
+
+// The arms' weight, as far as it and the gains together ask for no more than the share of a joint's effort that the
+// limits leave; nothing where the pose is not measured now.
+void RobotGuard::carry_arms(double now) {
+  const bool is_measured = level_of(now - next_.state_at, setup_.rules.state) < StopLevel::kHold;
+  for (const int joint : setup_.limiter.executed.joints) {
+    const double most = setup_.limiter.limits.torque_share * setup_.limiter.robot->joints[joint].effort;
+    const double by_gains = joints_.kp[joint] * (joints_.q_target[joint] - reading_.state.q[joint]) -
+                            joints_.kd[joint] * reading_.state.v[joint];
+    const double weight = is_measured ? gains_ * contact_.weight()[6 + joint] : 0.0;
+    joints_.tau_ff[joint] = std::clamp(weight, std::min(-most - by_gains, 0.0), std::max(most - by_gains, 0.0));
+  }
 }
 
 void RobotGuard::command(double now) {
@@ -294,12 +332,14 @@ void RobotGuard::command(double now) {
   if (status_.order.damps || !status_.order.writes) follows_stance_ = next_.stands = false;
   if (status_.order.stands || (holds && !planned)) follow_stance();
   walk(planned);
-  if (!planned) return;
-  for (const int joint : setup_.limiter.executed.joints) {
-    joints_.q_target[joint] = status_.limited.q[joint];
-    joints_.kp[joint] = status_.limited.kp[joint];
-    joints_.kd[joint] = status_.limited.kd[joint];
+  if (planned) {
+    for (const int joint : setup_.limiter.executed.joints) {
+      joints_.q_target[joint] = status_.limited.q[joint];
+      joints_.kp[joint] = status_.limited.kp[joint];
+      joints_.kd[joint] = status_.limited.kd[joint];
+    }
   }
+  if (setup_.arm_gravity) carry_arms(now);
 }
 
 // Runs from when it stands until it is damped, a hold included, 50 times a second; the velocity has passed the limiter.

@@ -11,6 +11,7 @@
 #include "duet/hardware/guard/person_track.h"
 #include "duet/hardware/guard/walker.h"
 #include "duet/hardware/safety/contact_watch.h"
+#include "duet/hardware/safety/foot_load.h"
 #include "duet/hardware/safety/joint_watch.h"
 #include "duet/hardware/safety/limiter.h"
 #include "duet/hardware/safety/safety_machine.h"
@@ -24,8 +25,10 @@ namespace duet {
 struct GuardSetup {
   LimiterSetup limiter;  // its dt is the guard's period
   SafetyRules rules;
-  int mode_machine = 5;  // that the robot has to report
-  JointCommand stance;   // of the joints that the limiter does not move: targets and gains
+  int mode_machine = 5;     // that the robot has to report
+  JointCommand stance;      // of the joints that the limiter does not move: targets and gains
+  double gain_ramp = 1.0;   // in which the stiffness of all joints rises to its full size once it stands up [s]
+  bool arm_gravity = true;  // the weight of the arms is fed forward, as far as the torque's limit leaves room
   bool dry_run = true;
   ExecutorKind executor = ExecutorKind::kTwin;      // for the log
   std::string walker = {};                          // the controller in the guard; for the log
@@ -117,7 +120,10 @@ class RobotGuard {
   void watch_joints();
   void read_operator(double now);
   void check_robot();
+  void weigh();
   void follow_stance();
+  void raise_gains();
+  void carry_arms(double now);
   void command(double now);
   void walk(bool planned);
   void keep_walking();
@@ -130,6 +136,8 @@ class RobotGuard {
   VelocitySink& velocity_;
   Limiter limiter_;
   ContactWatch contact_;
+  FootLoad feet_;
+  double carried_ = std::numeric_limits<double>::quiet_NaN();  // RobotHealth
   LimiterState limiter_state_;
   LimiterInput input_;
   PlannerMessage planner_;
@@ -150,6 +158,7 @@ class RobotGuard {
   RobotState measured_;
   std::vector<AxisState> stance_;  // of all joints, on the way to the stance
   JointCommand joints_;
+  double gains_ = 0.0;  // share of their full stiffness that the joints have
   SafetyMemory safety_;
   SafetyInput next_;
   bool armed_ = false, was_planned_ = false, stop_asked_ = false, has_own_clock_ = true;

@@ -84,6 +84,9 @@ class ContactWatch {
 
   // `tau`: of all joints as measured [N m]. Both finite and of the robot's size.
   ContactReading update(const RobotState& state, const Eigen::VectorXd& tau);
+  // The generalized forces that hold the robot against gravity in the last update's pose: of the base, then of each
+  // joint [N m]. Zero before the first.
+  [[nodiscard]] const Eigen::VectorXd& weight() const { return bias_; }
 
  private:
   [[nodiscard]] double threshold(int joint) const;

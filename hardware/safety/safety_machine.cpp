@@ -53,7 +53,8 @@ void wait_armed(const SafetyRules& rules, const SafetyInput& input, SafetyMemory
 void stand(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
   if (stopped(rules, input, false, memory)) return;
   const bool well = assess(rules, input, memory.bad, memory.last_now, true).level < StopLevel::kHold;
-  if (input.run && input.stands && well) enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
+  const bool may_walk = walk_waits_for(rules, input) == StopCause::kNone;
+  if (input.run && input.stands && well && may_walk) enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
 }
 
 // Whether a hold ends without anybody asking: nothing but the planner was late, and not for long.
@@ -72,7 +73,7 @@ void hold(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memo
     if (well && input.stand) enter(SafetyState::kStand, StopCause::kNone, input.now, memory);
     return;
   }
-  const bool asked = memory.let_go && input.run;
+  const bool asked = memory.let_go && input.run && walk_waits_for(rules, input) == StopCause::kNone;
   if (found.level < StopLevel::kHold && (asked || may_return(rules, memory, input)))
     enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
 }
@@ -101,7 +102,8 @@ std::string_view missing_for_arming(const SafetyRules& rules, const SafetyMemory
     return stop_cause_name(StopCause::kTemperature);
   if (health.joints.excess > rules.warn_range) return stop_cause_name(StopCause::kJointRange);
   if (input.state_delay > rules.delay.warn) return stop_cause_name(StopCause::kStateDelay);
-  return "";
+  const StopCause walking = rules.stands_alone ? walk_waits_for(rules, input) : StopCause::kNone;
+  return walking == StopCause::kNone ? "" : stop_cause_name(walking);
 }
 
 SafetyMemory next_safety(const SafetyRules& rules, const SafetyMemory& before, const SafetyInput& input) {
@@ -154,6 +156,11 @@ StopCause stand_waits_for(const SafetyRules& rules, const SafetyInput& input) {
   return rules.person_present && !seen ? StopCause::kPersonAge : StopCause::kNone;
 }
 
+StopCause walk_waits_for(const SafetyRules& rules, const SafetyInput& input) {
+  if (!(input.health.tilt <= rules.start_tilt)) return StopCause::kTilt;
+  return input.health.carried >= rules.least_carried ? StopCause::kNone : StopCause::kRope;
+}
+
 namespace {
 
 struct CauseText {
@@ -190,6 +197,7 @@ constexpr std::array<CauseText, kStopCauses> kCauses = {{
     {"joint_frozen", "angle, speed and torque of joints stand still to the bit while states come: their bus hangs"},
     {"joint_mismatch", "a joint's speed is not that of its angle: order of the joints, or a sensor"},
     {"joint_range", "a joint is beyond its limits: its zero is wrong, or it was calibrated in another pose"},
+    {"rope", "its feet do not carry it, or its knees are straight: let the rope down until it stands by itself"},
 }};
 
 StopLevel damp_if(bool wrong) { return wrong ? StopLevel::kDamp : StopLevel::kFine; }
@@ -250,6 +258,10 @@ void assess_motion(const SafetyRules& rules, const SafetyInput& input, Assessmen
 
 std::string_view stop_cause_name(StopCause cause) { return kCauses[static_cast<std::size_t>(cause)].name; }
 std::string_view stop_cause_text(StopCause cause) { return kCauses[static_cast<std::size_t>(cause)].text; }
+std::string_view stop_cause_text(std::string_view name) {
+  const auto found = std::ranges::find(kCauses, name, &CauseText::name);
+  return found == kCauses.end() ? "" : found->text;
+}
 
 void note_bad_states(int count, double now, BadStates& bad) {
   for (int k = 0; k < std::min(count, static_cast<int>(BadStates::kKept)); ++k) {

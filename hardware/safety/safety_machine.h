@@ -46,11 +46,13 @@ enum class StopCause {
   kJointFrozen,
   kJointMismatch,
   kJointRange,
+  kRope,  // its feet do not carry it: it does not begin to walk
 };
-inline constexpr std::size_t kStopCauses = 28;
+inline constexpr std::size_t kStopCauses = 29;
 std::string_view stop_cause_name(StopCause cause);  // "state_age", ...
 // Its meaning and where to look, as a sentence for the screen; "" for kNone.
 std::string_view stop_cause_text(StopCause cause);
+std::string_view stop_cause_text(std::string_view name);  // the same by its name; "" for another
 
 inline constexpr double kNever = -std::numeric_limits<double>::infinity();
 
@@ -80,6 +82,9 @@ struct SafetyRules {
   double hold_tilt = 0.5, damp_tilt = 1.0;     // [rad]
   double joint_speed_share = 1.0;              // RobotHealth
   double gyro = 6.0;                           // [rad/s]
+  double start_tilt = 0.2;                     // beyond which it does not begin to walk [rad]
+  double least_carried = 0.5;                  // RobotHealth::carried below which it does not
+  bool stands_alone = false;                   // its executor keeps it on its feet: it stands before it is armed
   double warn_range = 0.02, hold_range = 0.1;  // of a joint beyond its limits: play and zero error; more [rad]
   // A warning is no reason to stop, but keeps it from being armed.
   double warn_casing = 75.0, hold_casing = 85.0;  // [degrees C]
@@ -105,6 +110,7 @@ struct RobotHealth {
   double charge = 100.0;               // [%]; NaN: not known, which holds
   bool motor_error = false;
   bool mode_is_expected = true;  // mode_pr, mode_machine
+  double carried = 1.0;          // share of its weight that its feet carry; NaN: not known
   JointDoubts joints;
 };
 
@@ -196,6 +202,9 @@ SafetyOrder safety_order(const SafetyRules& rules, const SafetyMemory& memory, c
 
 // The cause that keeps a robot in kStand from moving on to its stance; kNone: none does.
 StopCause stand_waits_for(const SafetyRules& rules, const SafetyInput& input);
+
+// The cause that keeps a robot from beginning to walk, also after a hold: it leans, or hangs; kNone: none does.
+StopCause walk_waits_for(const SafetyRules& rules, const SafetyInput& input);
 
 // The condition that is missing for arming; empty where none is.
 std::string_view missing_for_arming(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input);

@@ -8,6 +8,7 @@
 #include "duet/core/require.h"
 #include "duet/hardware/wire/low_level_frame.h"
 #include "duet/robots/dynamics.h"
+#include "duet/robots/roles.h"
 
 namespace duet {
 namespace {
@@ -59,7 +60,10 @@ TwinModel::TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions&
       random_(options.seed, stream_key({"twin"})),
       trunk_random_(options.seed, stream_key({"twin", "trunk"})),
       kinematics_(*robot_),
-      turning_(3, 6 + kG1Motors) {
+      turning_(3, 6 + kG1Motors),
+      dynamics_(*robot_),
+      weight_(Eigen::VectorXd::Zero(6 + kG1Motors)),
+      standing_(Eigen::VectorXd::Zero(kG1Motors)) {
   check(options_);
   const RobotState standing = robot_->standing_state();
   q_ = standing.q;
@@ -67,6 +71,21 @@ TwinModel::TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions&
   for (Eigen::VectorXd* values : {&v_, &a_, &tau_}) values->setZero(kG1Motors);
   asked_.height = X_WB_.p.z();
   if (!options_.engine.empty()) physics_ = std::make_unique<TwinPhysics>(options_.engine, robot_, kTwinPeriod);
+  if (physics_ == nullptr) stand_on_feet();
+}
+
+// Each foot carries half of it, below its ankle.
+void TwinModel::stand_on_feet() {
+  const RobotState standing = robot_->standing_state();
+  dynamics_.bias_forces(standing, weight_);
+  kinematics_.update(standing.X_WB, standing.q);
+  const std::vector<std::vector<int>> soles = soles_of_feet(*robot_);
+  for (std::size_t side = 0; side < soles.size(); ++side) {
+    const int foot = robot_->shapes[soles[side][0]].link;
+    kinematics_.point_jacobian(foot, kinematics_.p_WL(foot), turning_);
+    for (const int joint : robot_->roles.legs[side])
+      standing_[joint] = weight_[6 + joint] - 0.5 * robot_->total_mass() * kGravity * turning_(2, 6 + joint);
+  }
 }
 
 void TwinModel::obey(const LowCommandFrame& frame) {
@@ -88,13 +107,20 @@ void TwinModel::meet(const HumanBody& person) {
 }
 
 void TwinModel::step_joints(double dt) {
+  RobotState pose = robot_->standing_state();
+  pose.q = q_;
+  dynamics_.bias_forces(pose, weight_);
+  Eigen::VectorXd carried = Eigen::VectorXd::Zero(kG1Motors);
+  for (const std::vector<int>& arm : robot_->roles.arms)
+    for (const int joint : arm)
+      if (command_.motor[joint].kp > 0.0f) carried[joint] = weight_[6 + joint];
   for (int j = 0; j < kG1Motors; ++j) {
     const MotorCommandFrame& motor = command_.motor[j];
     const double effort = robot_->joints[j].effort;
     double tau = 0.0;
     if (motor.mode == 1) tau = motor.kp * (motor.q - q_[j]) + motor.kd * (motor.dq - v_[j]) + motor.tau;
     tau_[j] = std::clamp(tau, -effort, effort);
-    v_[j] += dt * (tau_[j] - kFriction * v_[j]) / kInertia;
+    v_[j] += dt * (tau_[j] - carried[j] - kFriction * v_[j]) / kInertia;
     q_[j] = std::clamp(q_[j] + dt * v_[j], robot_->joints[j].lower, robot_->joints[j].upper);
   }
 }
@@ -185,7 +211,8 @@ void TwinModel::write_state(LowStateFrame& frame) {
     motor.q = static_cast<float>(q_[j] + options_.joint_noise * random_.normal());
     motor.dq = static_cast<float>(v_[j] + condition.joint_speed + options_.joint_speed_noise * random_.normal());
     motor.ddq = static_cast<float>(a_[j]);
-    motor.tau_est = static_cast<float>(tau_[j]);
+    const bool stands = command_.motor[j].kp > 0.0f && !condition.hangs;
+    motor.tau_est = static_cast<float>(tau_[j] + (stands ? standing_[j] : 0.0));
     motor.vol = static_cast<float>(condition.voltage);
     motor.temperature[0] = static_cast<std::int16_t>(condition.casing);
     motor.temperature[1] = static_cast<std::int16_t>(condition.winding);

@@ -1,7 +1,7 @@
-// A stand-in for the robot at its wire: joints that follow their gains, a root that follows a velocity with lag, delay
-// and drift, the remote control. It has no gait and does not fall: it proves protocols, not walking. With an engine
-// (TwinOptions::engine) its body is simulated instead: what the wire commands is all that holds it up. The same seed
-// and calls give the same frames. One owner, one thread.
+// A stand-in for the robot at its wire: joints that follow their gains, arms that weigh while they are held, a root
+// that follows a velocity with lag, delay and drift, the remote control. It has no gait and does not fall: it proves
+// protocols, not walking. With an engine (TwinOptions::engine) its body is simulated instead: what the wire commands is
+// all that holds it up. The same seed and calls give the same frames. One owner, one thread.
 #pragma once
 
 #include <deque>
@@ -14,6 +14,7 @@
 #include "duet/core/numbers.h"
 #include "duet/hardware/wire/low_level_frame.h"
 #include "duet/hardware/wire/robot_wire.h"
+#include "duet/robots/dynamics.h"
 #include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/robot_model.h"
@@ -98,6 +99,7 @@ struct TwinCondition {
   bool motor_error = false;
   int mode_pr = 0;
   int mode_machine_offset = 0;
+  bool hangs = false;  // on a rope, in the first-order body: its legs carry nothing
 };
 
 class TwinModel {
@@ -135,6 +137,7 @@ class TwinModel {
   [[nodiscard]] const LowCommandFrame& last_command() const { return command_; }
 
  private:
+  void stand_on_feet();
   void step_joints(double dt);
   void step_root(double dt);
   void step_body(double dt);
@@ -148,6 +151,9 @@ class TwinModel {
   Kinematics kinematics_;
   Eigen::MatrixXd turning_;  // angular Jacobian of the trunk
   Eigen::VectorXd q_, v_, a_, tau_;
+  // Of the first-order body: torques of gravity; of the legs, while their motors hold it on its feet [N m].
+  Dynamics dynamics_;
+  Eigen::VectorXd weight_, standing_;
   Pose X_WB_;
   Eigen::Vector3d v_WB_ = Eigen::Vector3d::Zero();           // [m/s]
   Eigen::Vector3d w_WB_B_ = Eigen::Vector3d::Zero();         // [rad/s]

@@ -87,7 +87,7 @@ void operate(int tick, TwinModel& twin, RobotGuard& guard) {
   twin.remote.keys = key(RemoteKey::kR1);
   if (tick == 1200) guard.arm();
   if (tick > 1250 && tick < 1300) twin.remote.keys |= key(RemoteKey::kStart);
-  if (tick > 1700 && tick < 1750) twin.remote.keys |= key(RemoteKey::kA);
+  if (tick > 1800 && tick < 1850) twin.remote.keys |= key(RemoteKey::kA);
 }
 
 // Seconds of each of `count` ticks of a running guard, sorted. Throws std::runtime_error where it does not run.

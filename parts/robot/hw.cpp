@@ -157,6 +157,7 @@ class ArmedRun {
     const SafetyState state = status.safety.state;
     if (state != last_) say_state(status);
     if (status.input.now - said_at_ >= kSaidEvery) say_what_it_waits_for(status);
+    if (ModeWatch* mode = armed_ ? nullptr : side_.maker_mode()) mode->poll(monotonic_seconds());
     if (state == SafetyState::kReady && !armed_) try_to_arm(status);
     if (asked_to_end != 0) guard_.stop();
     // A robot that was armed is commanded until its operator has asked twice.
@@ -186,8 +187,9 @@ class ArmedRun {
   void say_what_it_waits_for(const GuardStatus& status) {
     std::string waits;
     if (last_ == SafetyState::kListen && !armed_ && !status.safety.missing.empty())
-      waits = fmt::format("lately missing: {}{}", status.safety.missing, in_doubt_text(guard_));
-    if (last_ == SafetyState::kStand && !status.input.stands) waits = stand_waits(status);
+      waits = fmt::format("lately missing: {}{}: {}", status.safety.missing, in_doubt_text(guard_),
+                          stop_cause_text(status.safety.missing));
+    if (last_ == SafetyState::kStand) waits = status.input.stands ? walk_waits(status) : stand_waits(status);
     const long refused = refused_estimates(status.person);
     if (refused > told_refused_)
       waits += fmt::format("{}{}", waits.empty() ? "" : "; ", person_counts_text(status.person));
@@ -205,13 +207,23 @@ class ArmedRun {
     if (cause != StopCause::kNone) return fmt::format("does not move: {}", stop_cause_name(cause));
     return status.share < 0.01 ? "does not move: somebody is too near, or nobody says where the robot is" : "";
   }
+  [[nodiscard]] std::string walk_waits(const GuardStatus& status) const {
+    const StopCause cause = walk_waits_for(guard_.setup().rules, status.input);
+    if (cause == StopCause::kNone) return "";
+    return fmt::format("does not walk: {}: {}", stop_cause_name(cause), stop_cause_text(cause));
+  }
   void try_to_arm(const GuardStatus& status) {
     facts_.now = monotonic_seconds();  // as the word's age is told, whatever clock the guard ticks by
     facts_.remote_key_held = status.input.now - status.input.dead_man_at < 0.1;
     facts_.reported_mode_machine = guard_.reading().mode_machine;
     facts_.executor_complaint = side_.executor().complaint();
+    const ModeWatch* mode = side_.maker_mode();
+    facts_.running_mode = mode == nullptr ? "" : mode->mode().value_or("");
     refusal_ = arming_refusal(facts_);
     if (!refusal_.empty()) return;
+    if (!facts_.twin && mode != nullptr && !mode->mode())
+      note(session_,
+           "the maker's motion_switcher does not answer: whether a mode of the maker's owns the motors is not known");
     guard_.arm();
     armed_ = true;
   }
@@ -252,6 +264,8 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   const std::unique_ptr<Walker> walker = walker_for(arguments, setup);
   RunLog log(arguments.log, setup, status_sender(arguments.socket));
   ArmingFacts facts = facts_for(config, setup, arguments, log);
+  if (!config.twin)
+    note(session, fmt::format("where this program dies nothing commands it: {}", when_commands_end(config)));
   note(session,
        fmt::format("{}\nguards {}: damps it, stands it up at start, follows the planner at '{}' at A, moves only "
                    "while R1 is held, logs to '{}'. Ctrl-C damps it, twice ends.\n{}\ntype '{}' within {} s to arm:",

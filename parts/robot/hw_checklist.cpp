@@ -1,6 +1,7 @@
 // duet hw checklist: the form before a robot is armed.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ctime>
 #include <filesystem>
 #include <memory>
@@ -69,6 +70,18 @@ std::string checked_form(Session& session, const std::string& config_path, const
   if (!refusal.empty() && config.checklist.required) throw InputError("not armed: " + refusal);
   if (!refusal.empty()) note(session, "warning: " + refusal);
   return form.who.empty() ? "" : dumped(checklist_json(form));
+}
+
+std::string when_commands_end(const RobotConfig& config) {
+  const auto item = std::ranges::find(kChecklist, "commands_end", &ChecklistItem::name) - kChecklist.begin();
+  std::string value;
+  try {
+    if (!config.checklist.form.empty())
+      value = read_checklist(config.checklist.form).answers[static_cast<std::size_t>(item)].value;
+  } catch (const InputError&) {  // said by checked_form()
+  }
+  return value.empty() ? "what it does then is not known: nobody filled in 'commands_end' of a checklist"
+                       : fmt::format("on the gantry it then did: {}", value);
 }
 
 void add_checklist(CLI::App& hardware, Session& session) {

@@ -280,6 +280,15 @@ TEST(Arming, NeedsAnExecutorThatIsWell) {
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.executor_complaint = "it is silent"; }));
 }
 
+TEST(Arming, NeedsMotorsThatNoModeOfTheMakersOwns) {
+  EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.running_mode = "ai"; }));
+  EXPECT_EQ(refusal([](ArmingFacts& f) {
+              f.running_mode = "ai";
+              f.executor = ExecutorKind::kSport;
+            }),
+            "");
+}
+
 TEST(Arming, NeedsALogThatCanBeWritten) {
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.log_is_open = false; }));
   EXPECT_SENTENCE(refusal([](ArmingFacts& f) { f.free_log_bytes = 0.9e9; }));

@@ -2,6 +2,7 @@
 // person at 30 Hz, and a place for faults on the way.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <deque>
@@ -151,7 +152,7 @@ struct GuardedTwin {
   void note_motor(int j, const MotorCommandFrame& motor, bool damps) {
     const RobotJoint& joint = g1()->joints[j];
     const bool finite = std::isfinite(motor.q) && std::isfinite(motor.kp) && std::isfinite(motor.kd);
-    if (!finite || motor.tau != 0.0f || motor.dq != 0.0f) ++bad_frames;
+    if (!finite || motor.dq != 0.0f || !carries_within_its_share(j, motor)) ++bad_frames;
     if (damps) {
       if (motor.kp != 0.0f || motor.kd != 8.0f) ++bad_frames;
       return;
@@ -163,6 +164,16 @@ struct GuardedTwin {
     if (follows && std::abs(rate) > kMostStep) ++fast_targets;
     if (follows && std::isfinite(rates[j])) largest_change = std::max(largest_change, std::abs(rate - rates[j]));
     rates[j] = rate;
+  }
+
+  // What is fed forward is none of a joint that the limiter does not move, and takes no arm past its share of effort.
+  [[nodiscard]] bool carries_within_its_share(int j, const MotorCommandFrame& motor) const {
+    const LimiterSetup& limiter = guard.setup().limiter;
+    if (std::ranges::find(limiter.executed.joints, j) == limiter.executed.joints.end()) return motor.tau == 0.0f;
+    const RobotState& state = guard.reading().state;
+    const double by_gains = motor.kp * (motor.q - state.q[j]) - motor.kd * state.v[j];
+    const double most = std::max(std::abs(by_gains), limiter.limits.torque_share * g1()->joints[j].effort);
+    return std::abs(by_gains + motor.tau) <= most + 1e-3;  // numbers on the wire are short
   }
 
   TwinModel twin;

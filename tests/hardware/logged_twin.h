@@ -34,6 +34,7 @@ struct LoggedTwin {
     robot.hold_key(RemoteKey::kStart);
     run_for(0.1, each);
     robot.drop_key(RemoteKey::kStart);
+    run_for(0.9, each);  // its gains rise
     robot.hold_key(RemoteKey::kA);
   }
 

@@ -314,6 +314,145 @@ TEST(RobotGuard, AHoldBeforeItStoodStopsEveryJointAndDoesNotWalk) {
   EXPECT_NEAR(standing.left(), 0.0, 1e-6);
 }
 
+// The share of the card's stiffness that a knee is sent.
+double stiffness(const GuardedTwin& robot) {
+  const int knee = test::g1()->roles.legs[0][3];
+  return robot.last.motor[knee].kp / robot.guard.setup().stance.kp[knee];
+}
+
+TEST(RobotGuard, GainsRiseWhileItStandsUpAndItStandsWithFullOnes) {
+  GuardedTwin robot;
+  robot.hold_key(RemoteKey::kR1);
+  for (int again = 0; again < 2; ++again) {
+    robot.run_for(2.2);
+    robot.guard.arm();
+    robot.tick();
+    robot.hold_key(RemoteKey::kStart);
+    robot.tick();
+    robot.drop_key(RemoteKey::kStart);
+    EXPECT_NEAR(stiffness(robot), 0.1, 1e-6);
+    EXPECT_GT(robot.last.motor[3].kd, 0.0f) << "its damping is there at once";
+    double before = 0.0;
+    for (int k = 0; k < 499; ++k) {
+      robot.tick();
+      EXPECT_GT(stiffness(robot), before);
+      EXPECT_FALSE(robot.guard.status().input.stands) << k;
+      before = stiffness(robot);
+    }
+    robot.run_for(0.01);
+    EXPECT_NEAR(stiffness(robot), 1.0, 1e-6);
+    EXPECT_TRUE(robot.guard.status().input.stands);
+    robot.guard.stop();  // damped, and stood up anew
+    robot.run_for(5.1);
+    ASSERT_EQ(robot.state(), SafetyState::kListen);
+  }
+  EXPECT_EQ(robot.bad_frames, 0);
+}
+
+// An arm that is stretched out ahead.
+struct Reaching {
+  explicit Reaching(const GuardSetup& setup = test::twin_guard()) : robot(setup) {
+    robot.start();
+    robot.message.command.q[shoulder()] = -0.9;
+    robot.message.command.q[elbow()] = 0.9;
+    robot.run_for(4.0);
+  }
+  static int shoulder() { return test::g1()->roles.arms[0][0]; }
+  [[nodiscard]] double fed() const { return robot.last.motor[shoulder()].tau; }
+  [[nodiscard]] double sags() const { return std::abs(robot.twin.q()[shoulder()] - robot.last.motor[shoulder()].q); }
+  GuardedTwin robot;
+};
+
+TEST(RobotGuard, TheWeightOfTheArmsIsFedForward) {
+  GuardSetup without = test::twin_guard();
+  without.arm_gravity = false;
+  const Reaching carried, sagging(without);
+  ASSERT_EQ(carried.robot.state(), SafetyState::kRun);
+  EXPECT_LT(carried.fed(), -2.0) << "upwards";
+  EXPECT_LT(carried.sags(), 0.005);
+  EXPECT_EQ(sagging.fed(), 0.0);
+  EXPECT_GT(sagging.sags(), 0.04);
+  EXPECT_EQ(carried.robot.last.motor[3].tau, 0.0f) << "of a leg nothing is";
+  EXPECT_EQ(carried.robot.bad_frames, 0);
+}
+
+TEST(RobotGuard, WeightAndGainsTogetherAskForNoMoreThanTheShareOfTheEffort) {
+  Reaching blocked;
+  GuardedTwin& robot = blocked.robot;
+  const auto angle = static_cast<float>(robot.twin.q()[Reaching::shoulder()]);
+  robot.spoil = [angle](GuardedTwin::Frames& frames) {
+    for (LowStateFrame& frame : frames) {
+      frame.motor[Reaching::shoulder()].q = angle;
+      frame.motor[Reaching::shoulder()].dq = 0.0f;
+      seal(frame);
+    }
+  };
+  robot.message.command.q[Reaching::shoulder()] = -2.0;  // against something above it
+  robot.run_for(2.0);
+  const MotorCommandFrame& motor = robot.last.motor[Reaching::shoulder()];
+  const double most = 0.4 * test::g1()->joints[Reaching::shoulder()].effort;
+  EXPECT_NEAR(motor.kp * (motor.q - angle) + motor.tau, -most, 0.05);
+  EXPECT_EQ(robot.bad_frames, 0);
+}
+
+TEST(RobotGuard, WhatIsNotMeasuredNowIsNotCarried) {
+  Reaching reaching;
+  reaching.robot.spoil = [](GuardedTwin::Frames& frames) { frames.clear(); };
+  reaching.robot.run_for(0.016);
+  EXPECT_LT(reaching.fed(), -2.0);
+  reaching.robot.run_for(0.008);
+  EXPECT_EQ(reaching.fed(), 0.0);
+  EXPECT_EQ(reaching.robot.state(), SafetyState::kHold);
+}
+
+TEST(RobotGuard, DoesNotWalkWhileItHangsOrLeans) {
+  for (const bool leans : {false, true}) {
+    GuardedTwin robot;
+    const auto trouble = [&](bool there) {
+      robot.twin.condition.hangs = there && !leans;
+      robot.twin.condition.roll = there && leans ? 0.25 : 0.0;
+    };
+    trouble(true);
+    robot.start();
+    EXPECT_EQ(robot.state(), SafetyState::kStand);
+    EXPECT_TRUE(robot.guard.status().input.stands);
+    EXPECT_EQ(walk_waits_for(robot.guard.setup().rules, robot.guard.status().input),
+              leans ? StopCause::kTilt : StopCause::kRope);
+    trouble(false);
+    robot.run_for(1.0);
+    robot.hold_key(RemoteKey::kA);
+    robot.run_for(0.1);
+    EXPECT_EQ(robot.state(), SafetyState::kRun);
+    EXPECT_NEAR(robot.guard.status().input.health.carried, 1.0, 0.1);
+    robot.drop_key(RemoteKey::kA);
+    robot.wire.foreign = 1;  // held, hung up, and asked to go on
+    robot.run_for(0.3);
+    robot.wire.foreign = 0;
+    trouble(true);
+    robot.run_for(2.0);
+    robot.hold_key(RemoteKey::kA);
+    robot.run_for(0.2);
+    EXPECT_EQ(robot.state(), SafetyState::kHold);
+  }
+}
+
+// HOMIE's or the maker's own controller keeps it on its feet: it has to be there before it is armed.
+TEST(RobotGuard, ARobotThatHangsIsNotArmedWhereItsExecutorWalks) {
+  GuardSetup setup = test::twin_guard();
+  setup.rules.stands_alone = true;
+  GuardedTwin robot(setup);
+  LowCommandFrame held;
+  build_command(setup.stance, 5, held);
+  robot.twin.obey(held);  // by the other program
+  robot.twin.condition.hangs = true;
+  robot.run_for(3.0);
+  EXPECT_EQ(robot.state(), SafetyState::kListen);
+  EXPECT_EQ(robot.guard.status().safety.missing, "rope");
+  robot.twin.condition.hangs = false;
+  robot.run_for(3.5);
+  EXPECT_EQ(robot.state(), SafetyState::kReady);
+}
+
 TEST(RobotGuard, AWriterThatIsLostDampsAndIsMadeAnew) {
   GuardedTwin robot;
   robot.start();
@@ -427,6 +566,7 @@ TEST(RobotGuard, RefusesWhatItCannotGuard) {
   EXPECT_SENTENCE(refusal([](GuardSetup& s) { s.limiter.robot = nullptr; }));
   EXPECT_SENTENCE(refusal([](GuardSetup& s) { s.limiter.robot = load_shared_robot("g1_12dof"); }));
   EXPECT_SENTENCE(refusal([](GuardSetup& s) { s.stance.kp.resize(2); }));
+  EXPECT_SENTENCE(refusal([](GuardSetup& s) { s.gain_ramp = -1.0; }));
 }
 
 }  // namespace

@@ -287,6 +287,31 @@ TEST(SafetyMachine, ChargeAndHeatKeepItFromBeingArmedBeforeTheyHold) {
   }
 }
 
+TEST(SafetyMachine, BeginsToWalkOnlyUprightAndOnItsFeet) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& spoil :
+       {Spoil([](SafetyInput& in) { in.health.tilt = 0.21; }), Spoil([](SafetyInput& in) { in.health.carried = 0.49; }),
+        Spoil([nan](SafetyInput& in) { in.health.carried = nan; })}) {
+    SimulatedSafety robot = in_state(SafetyState::kStand);
+    robot.input.run = true;
+    robot.run_for(1.0, spoil);
+    EXPECT_EQ(robot.memory.state, SafetyState::kStand);
+    robot = in_state(SafetyState::kRun);
+    robot.run_for(1.0, spoil);
+    EXPECT_EQ(robot.memory.state, SafetyState::kRun) << "one that walks is not held for it";
+    robot = in_state(SafetyState::kListen);
+    robot.run_for(3.0, spoil);
+    EXPECT_EQ(robot.memory.state, SafetyState::kReady) << "one that is stood up by us may hang";
+    robot = in_state(SafetyState::kListen);
+    robot.rules.stands_alone = true;
+    robot.run_for(3.0, spoil);
+    EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+    EXPECT_TRUE(robot.memory.missing == "rope" || robot.memory.missing == "tilt") << robot.memory.missing;
+    EXPECT_FALSE(stop_cause_text(robot.memory.missing).empty());
+  }
+  EXPECT_EQ(stop_cause_text("none of them"), "");
+}
+
 TEST(SafetyMachine, DampingLastsFiveSecondsAndThenLatches) {
   SimulatedSafety robot = in_state(SafetyState::kRun);
   robot.tick([](SafetyInput& in) { in.health.tilt = 1.2; });

@@ -201,6 +201,39 @@ TEST(FakeSwitcher, SaysWhichModeRunsAndReleasesIt) {
   EXPECT_NE(debug.answer(read_request(7, ServiceCall::kGetFsm)).code, 0);
 }
 
+// A robot whose motion_switcher answers.
+class SwitcherWire final : public test::MemorySport {
+ public:
+  std::optional<FakeSwitcher> switcher;
+
+ private:
+  std::optional<RpcResponse> answer(const RpcRequest& request) override {
+    return switcher ? std::optional(switcher->answer(request)) : std::nullopt;
+  }
+  int arm_writers() override { return 0; }
+  void open_arms() override {}
+  void close_arms() override {}
+  bool write_arms(const LowCommandFrame&) override { return false; }
+};
+
+TEST(ModeWatch, AsksOnceASecondWhichModeRunsAndNothingElse) {
+  SwitcherWire wire;
+  ModeWatch watch(wire);
+  auto poll_for = [&, now = 10.0](double seconds) mutable {
+    for (const double end = now + seconds; now < end; now += 0.002) watch.poll(now);
+  };
+  poll_for(3.0);
+  EXPECT_FALSE(watch.mode()) << "nobody answers";
+  wire.switcher.emplace("ai");
+  poll_for(1.1);
+  EXPECT_EQ(watch.mode(), "ai");
+  (void)wire.switcher->answer(read_request(9, ServiceCall::kReleaseMode));
+  poll_for(1.1);
+  EXPECT_EQ(watch.mode(), "");
+  EXPECT_LE(wire.requests.size(), 6U);
+  for (const RpcRequest& request : wire.requests) EXPECT_EQ(request.call, ServiceCall::kCheckMode);
+}
+
 TEST(SportRpc, WritesTheParametersThatTheMakersClientWrites) {
   EXPECT_STREQ(velocity_request(1, {0.2, -0.1, 0.05, 0.74}, 0.3).parameter.data(),
                R"({"velocity":[0.2000,-0.1000,0.0500],"duration":0.30})");

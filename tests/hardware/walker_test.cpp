@@ -1,6 +1,7 @@
 // A walking controller in the guard, the twin's body in an engine: the whole loop but for the wire between them.
 #include "duet/hardware/guard/walker.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -131,6 +132,54 @@ TEST(Walker, WbcSimWalksTheTwinBehindTheGuard) {
   EXPECT_FALSE(causes.contains(StopCause::kJointSpeed));
   EXPECT_GT(gone(rollout), 0.3);
   EXPECT_FALSE(has_fallen(rollout.recording.robot.back(), test::g1()->fall));
+}
+
+// How far the arms of a twin that stands, both stretched out ahead, come to rest below what they are sent [rad].
+double arms_sag(bool arm_gravity, double* carried = nullptr) {
+  GuardSetup setup = test::twin_guard();
+  setup.arm_gravity = arm_gravity;
+  TwinInProcess twin(setup, {.engine = "mujoco"}, std::make_unique<Walker>("wbc_sim", ControllerOptions{}, test::g1()),
+                     nullptr);
+  PlannerMessage plan;
+  plan.command.q = test::g1()->neutral;
+  plan.command.root.height = HardwareLimits{}.height;
+  for (const std::vector<int>& arm : test::g1()->roles.arms) {
+    plan.command.q[arm[0]] = -0.9;
+    plan.command.q[arm[3]] = 0.9;
+  }
+  GuardReport report;
+  double on_rope = 1.0;
+  while (twin.twin().time() < 16.0) {
+    ++plan.sequence;
+    plan.command.stamp = twin.twin().time();
+    twin.send(plan);
+    twin.next(report);
+    const double now = twin.guard().status().input.health.carried;
+    if (report.state <= SafetyState::kReady && !std::isnan(now)) on_rope = now;
+  }
+  EXPECT_EQ(report.state, SafetyState::kRun);
+  if (carried != nullptr) {
+    carried[0] = on_rope;
+    carried[1] = twin.guard().status().input.health.carried;
+  }
+  double sag = 0.0;
+  for (const std::vector<int>& arm : test::g1()->roles.arms)
+    for (const int joint : arm)
+      sag = std::max(sag, std::abs(twin.twin().q()[joint] - twin.guard().joints().q_target[joint]));
+  return sag;
+}
+
+TEST(Walker, TheWeightOfTheArmsIsFedForwardAndItsFeetAreWeighed) {
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  double carried[2] = {};
+  const double with = arms_sag(true, carried), without = arms_sag(false);
+  fmt::print(
+      "arms stretched out sag by {:.3f} rad, without their weight by {:.3f}; the feet carry {:.2f}, limp on "
+      "the rope, and {:.2f} without it\n",
+      with, without, carried[0], carried[1]);
+  EXPECT_LT(with, 0.2 * without);
+  EXPECT_LT(carried[0], 0.3);
+  EXPECT_NEAR(carried[1], 1.0, 0.1);
 }
 
 // A small version of `duet hw walks`: behind, to the side, and ahead with its back to where it came from.
