@@ -65,8 +65,8 @@ std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
 inline constexpr int kTriedTicks = 5;
 
 // Lets `controller`, guarded, act in the robot's standing pose, as long as that takes to know it. Throws InputError
-// where a command is not finite, and where the quickest of kTriedTicks first ticks computes for longer than a tick: what
-// else a busy machine does is not counted. One that throws is left to the episode, which says where. `name` is for
+// where a command is not finite, and where the quickest of kTriedTicks first ticks computes for longer than a tick:
+// what else a busy machine does is not counted. One that throws is left to the episode, which says where. `name` is for
 // messages.
 void require_usable(Controller& controller, const RobotModel& robot, const std::string& name);
 
