@@ -176,7 +176,10 @@ TEST(FillGaps, OfWhatLengthIsToldAndAlsoAtTheEnds) {
 
 TEST(LowRate, OfSevenHertzIsReadResampledAndCounted) {
   const InteractionClip clip = standin_clip(250, 50.0);
-  const InteractionClip slow = {.task = clip.task, .a = resample(clip.a, 7.0), .b = resample(clip.b, 7.0)};
+  InteractionClip slow;
+  slow.task = clip.task;
+  slow.a = resample(clip.a, 7.0);
+  slow.b = resample(clip.b, 7.0);
   const RawPeople people = test::standin_people(slow, joint_layout("kinect-25"));
   const SourceClip found = clip_of(people);
   EXPECT_EQ(found.clip.rate_hz(), 50.0);
