@@ -152,7 +152,7 @@ TEST(MissingTags, ASuiteOfDescriptorsIsReadBesideThem) {
   std::filesystem::copy_file(DUET_SOURCE_DIR "/controllers/descriptors/rl_gym.yaml", folder / "mine.yaml");
   const std::string yaml =
       "schema: duet.suite/1\nname: s\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
-      "controllers: [{name: mine, use: mine.yaml}]\npolicies: [replay]\nnull_arm: false\n"
+      "engines: [mujoco]\ncontrollers: [{name: mine, use: mine.yaml}]\npolicies: [replay]\nnull_arm: false\n"
       "perturbations: [{name: a, jitter: {sigma: 0.01}, tags: {level: 1}}]\n";
   duet::Run run;
   run.info.suite_yaml = yaml;

@@ -262,8 +262,12 @@ class Trial {
 };
 
 bool goes_on(const Fault& fault) { return fault.ends == SafetyState::kRun || fault.ends == SafetyState::kListen; }
+// The noise of the measured pose moves arms whose weight is fed forward by a hundredth.
+constexpr double kStillJoint = 0.02;  // [rad/s]
+constexpr double kStillRoot = 0.001;  // [m/s]
+
 bool rests(const Record& seen) {
-  return seen.joint_speed < 1e-3 && seen.root_speed < 1e-3 && !seen.gains_after_damping;
+  return seen.joint_speed < kStillJoint && seen.root_speed < kStillRoot && !seen.gains_after_damping;
 }
 
 std::string line_of(const Fault& fault, SafetyState before, const Record& seen) {
