@@ -1,5 +1,5 @@
-// What the floor does to a robot's feet, from the torques that its legs report: at rest g(q) = tau + J^T F. A robot
-// that hangs is carried by none of them. Buffers are sized on construction. One owner, one thread.
+// The floor's wrench on each foot of a robot, from the torques that its legs report: at rest g(q) = tau + J^T F. A
+// robot that hangs is carried by none of them. Buffers are sized on construction. One owner, one thread.
 #pragma once
 
 #include <array>

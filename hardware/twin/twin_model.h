@@ -151,7 +151,7 @@ class TwinModel {
   Kinematics kinematics_;
   Eigen::MatrixXd turning_;  // angular Jacobian of the trunk
   Eigen::VectorXd q_, v_, a_, tau_;
-  // Of the first-order body: torques of gravity; of the legs, while their motors hold it on its feet [N m].
+  // Torques of the first-order body: of gravity; of the legs, while their motors hold it on its feet [N m].
   Dynamics dynamics_;
   Eigen::VectorXd weight_, standing_;
   Pose X_WB_;

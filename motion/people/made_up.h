@@ -1,5 +1,5 @@
-// What a recording lacks and duet makes up, so that it can be read: legs below upper bodies, a partner for one alone.
-// Of each kind ("gaps", "legs", "partner", "rate") the clip's `source` has the share of frames. Pure functions.
+// Makes up parts that a recording lacks, so that it can be read: legs below upper bodies, a partner for one alone.
+// The clip's `source` has the share of frames of each kind ("gaps", "legs", "partner", "rate"). Pure functions.
 #pragma once
 
 #include <map>
@@ -16,7 +16,7 @@ namespace duet {
 inline constexpr double kAverageStature = 1.70;  // of a body of which nothing is known [m]
 inline constexpr double kLowRate = 10.0;  // below it two frames lie farther apart than half of the shortest act [Hz]
 
-// Of people whose layout has columns that are made up: fills these with straight legs of the average body, below the
+// Fills the columns that a layout says are made up with straight legs of the average body, below the
 // hips, the pelvis or the neck, facing as the shoulders do; both people's end on one floor. Returns the sentence of it.
 // Throws InputError where neither file nor options nor the arms tell the unit, or the heads the up axis.
 std::string add_legs(RawPeople& people, const PeopleOptions& options);

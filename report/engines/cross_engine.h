@@ -129,6 +129,8 @@ Estimates rank_stability(const EngineRows& rows, const std::vector<EngineSuccess
 // For each item the largest difference of its rate in the reference to that of an item that `other` puts on another
 // side of it; the mean over items. Rates of the same items, one or more. Source: SIMPLER, arXiv 2405.05941, section IV.
 double mean_maximum_rank_violation(std::span<const double> reference, std::span<const double> other);
+// The mean of it with either as the reference.
+double rank_violation_of_both(std::span<const double> a, std::span<const double> b);
 // 1 where no item that is best in `a` is best in `b`, else 0: items that are tied for the best all win.
 double winner_change(std::span<const double> a, std::span<const double> b);
 

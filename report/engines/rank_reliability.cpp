@@ -144,8 +144,7 @@ RankFigures figures_of(const RankedEntries& all, std::span<const double> weights
         sums.tau_b += tau_b;
         ++defined;
       }
-      sums.violation +=
-          0.5 * (mean_maximum_rank_violation(pair.in_a, pair.in_b) + mean_maximum_rank_violation(pair.in_b, pair.in_a));
+      sums.violation += rank_violation_of_both(pair.in_a, pair.in_b);
       sums.winner_changes += winner_change(pair.in_a, pair.in_b);
       ++pairs;
     }
@@ -288,6 +287,10 @@ double mean_maximum_rank_violation(std::span<const double> reference, std::span<
     sum += largest;
   }
   return sum / static_cast<double>(reference.size());
+}
+
+double rank_violation_of_both(std::span<const double> a, std::span<const double> b) {
+  return 0.5 * (mean_maximum_rank_violation(a, b) + mean_maximum_rank_violation(b, a));
 }
 
 double winner_change(std::span<const double> a, std::span<const double> b) {

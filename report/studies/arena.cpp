@@ -238,6 +238,7 @@ void add_order(std::span<const Standing> board, double level, Estimates& into) {
 
 Pivot order_pivot(double level) {
   std::vector<std::string> theirs;
+  theirs.reserve(kPublicStandings.size());
   for (const PublicStanding& each : kPublicStandings)
     theirs.push_back(fmt::format("{} ({:.1f} s)", each.controller, each.survival));
   Pivot pivot{.title = fmt::format("Arena: the order beside {}", kPublicBenchmark),
@@ -301,31 +302,21 @@ EngineMeans engine_means(const std::vector<Standing>& standings, const std::stri
   return result;
 }
 
-struct EngineAgreement {
-  double tau_b = 0.0, lowest = 1.0, violation = 0.0;  // the mean over pairs of engines, the lowest, the mean
-  long pairs = 0;
-};
+using PairFigure = double (*)(std::span<const double>, std::span<const double>);
 
-// Each controller as often as `times` says.
-EngineAgreement agreement_of(const EngineMeans& means, std::span<const double> times) {
+double tau_b_of(std::span<const double> a, std::span<const double> b) { return kendall(a, b).tau_b; }
+
+// Of every two engines, each controller as often as `times` says.
+std::vector<double> of_pairs(const EngineMeans& means, std::span<const double> times, PairFigure figure) {
   std::vector<std::vector<double>> drawn(means.of_engine.size());
   for (std::size_t engine = 0; engine < drawn.size(); ++engine)
     for (std::size_t i = 0; i < times.size(); ++i)
       drawn[engine].insert(drawn[engine].end(), static_cast<std::size_t>(times[i]), means.of_engine[engine][i]);
-  EngineAgreement sum;
-  for (std::size_t a = 0; a < drawn.size(); ++a) {
-    for (std::size_t b = a + 1; b < drawn.size(); ++b) {
-      const double tau_b = kendall(drawn[a], drawn[b]).tau_b;
-      sum.tau_b += tau_b;
-      sum.lowest = std::min(sum.lowest, tau_b);
-      sum.violation +=
-          0.5 * (mean_maximum_rank_violation(drawn[a], drawn[b]) + mean_maximum_rank_violation(drawn[b], drawn[a]));
-      ++sum.pairs;
-    }
-  }
-  sum.tau_b /= static_cast<double>(sum.pairs);
-  sum.violation /= static_cast<double>(sum.pairs);
-  return sum;
+  std::vector<double> figures;
+  figures.reserve(drawn.size() * drawn.size() / 2);
+  for (std::size_t a = 0; a < drawn.size(); ++a)
+    for (std::size_t b = a + 1; b < drawn.size(); ++b) figures.push_back(figure(drawn[a], drawn[b]));
+  return figures;
 }
 
 void add_agreement(const std::vector<Standing>& standings, const std::string& actuation, double level,
@@ -334,17 +325,18 @@ void add_agreement(const std::vector<Standing>& standings, const std::string& ac
   if (means.of_engine.size() < 2 || means.controllers() < kFewestRanked) return;
   std::vector<int> numbers(means.controllers());
   std::iota(numbers.begin(), numbers.end(), 0);
-  const auto interval = [&](double EngineAgreement::*figure) {
-    const auto drawn_again = [&](std::span<const double> times) { return agreement_of(means, times).*figure; };
-    return ClusterBootstrap(kAgreementResamples, 1).weighted(numbers, drawn_again, level);
-  };
-  const EngineAgreement found = agreement_of(means, std::vector<double>(numbers.size(), 1.0));
   const EstimatesOf of{{.engine = "all", .perturbation = actuation, .of = "engines"}, into};
+  const auto add_mean = [&](const char* name, const std::vector<double>& found, PairFigure figure) {
+    const auto drawn_again = [&](std::span<const double> times) { return mean_of(of_pairs(means, times, figure)); };
+    of.add(name, static_cast<long>(found.size()), mean_of(found),
+           ClusterBootstrap(kAgreementResamples, 1).weighted(numbers, drawn_again, level));
+  };
+  const std::vector<double> once(numbers.size(), 1.0), tau_b = of_pairs(means, once, tau_b_of);
   of.count("controllers", {}, static_cast<long>(numbers.size()));
   of.count("saturated", {}, means.saturated);
-  of.add("mean_tau_b", found.pairs, found.tau_b, interval(&EngineAgreement::tau_b));
-  of.add("lowest_tau_b", found.pairs, found.lowest);
-  of.add("rank_violation", found.pairs, found.violation, interval(&EngineAgreement::violation));
+  add_mean("mean_tau_b", tau_b, tau_b_of);
+  of.add("lowest_tau_b", static_cast<long>(tau_b.size()), std::ranges::min(tau_b));
+  add_mean("rank_violation", of_pairs(means, once, rank_violation_of_both), rank_violation_of_both);
 }
 
 Pivot agreement_pivot(double level) {
@@ -387,6 +379,7 @@ Analysis arena_analysis(const std::vector<EpisodeRow>& rows, double level) {
   }
   Analysis analysis{.name = "arena", .title = "Arena", .level = level, .opens = true};
   std::vector<Standing> standings;
+  standings.reserve(entries.size());
   for (const auto& [entry, trials] : entries) standings.push_back(standing_of(entry, trials, level));
   std::ranges::sort(standings, {}, place_of);
   for (const Standing& standing : standings) add_standing(standing, names, analysis.estimates);

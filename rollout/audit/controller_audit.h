@@ -1,8 +1,8 @@
 // The audit of a controller's adapter: whether an IO descriptor says of a network what its makers meant. Levels: L0 it
-// loads; L1 it agrees with itself; L2 it does what it is told in the physics of its makers, as
-// far as they say which; L3 it answers a recorded trace as the
-// makers' program did. Where it does not, other readings of the descriptor (controllers/audit/readings.h) are tried,
-// and the one under which the network behaves much better names the defect. Not thread-safe.
+// loads; L1 it agrees with itself; L2 it does what it is told in the physics of its makers, as far as they say which;
+// L3 it answers a recorded trace as the makers' program did. Where it does not, other readings of the descriptor
+// (controllers/audit/readings.h) are tried, and the one under which the network behaves much better names the defect.
+// Not thread-safe.
 #pragma once
 
 #include <memory>
