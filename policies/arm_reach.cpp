@@ -73,13 +73,20 @@ void ArmReach::reach(int side, const Eigen::Vector3d& p_B, int steps, Eigen::Vec
 
 void HandWatch::reset() {
   height.fill(0.0);
+  ahead.fill(0.0);
   lowest.fill(std::numeric_limits<double>::infinity());
+  least_ahead = lowest;
 }
 
 void HandWatch::look(const ObservationFrame& frame) {
+  Eigen::Vector3d to_robot = frame.robot.X_WB.p - frame.partner.col(0);
+  to_robot.z() = 0.0;
+  to_robot.normalize();
   for (const auto& [side, hand] : {std::pair{0, kLeftHand}, {1, kRightHand}}) {
     height[side] = frame.partner(2, hand) - frame.partner(2, 0);
     lowest[side] = std::min(lowest[side], height[side]);
+    ahead[side] = to_robot.dot(frame.partner.col(hand) - frame.partner.col(0));
+    least_ahead[side] = std::min(least_ahead[side], ahead[side]);
   }
 }
 

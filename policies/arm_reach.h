@@ -42,14 +42,16 @@ class ArmReach {
   std::array<double, 2> length_ = {};
 };
 
-// How high each hand of the partner is over its root, and the lowest that it was so far. [m]
+// How high each hand of the partner is over its root and how far from it towards the robot, level, and the least of
+// both so far. [m]
 struct HandWatch {
-  std::array<double, 2> height = {}, lowest = {};
+  std::array<double, 2> height = {}, lowest = {}, ahead = {}, least_ahead = {};
 
   HandWatch() { reset(); }
   void reset();
   void look(const ObservationFrame& frame);
   [[nodiscard]] double rise(int side) const { return height[side] - lowest[side]; }
+  [[nodiscard]] double approach(int side) const { return ahead[side] - least_ahead[side]; }
 };
 
 }  // namespace duet

@@ -17,6 +17,7 @@ namespace {
 constexpr int kPlannedApart = 5;   // ticks between the places of a plan that are looked at
 constexpr int kReachSteps = 6;     // of the arm, from where the reference has it
 constexpr double kRootGain = 0.3;  // of what the arm lacks, a tick [1]
+constexpr double kClasp = 0.1;     // hands that have to touch for longer have to stay together [s]
 
 double eased(double from, double to, double value) {
   const double x = std::clamp((value - from) / (to - from), 0.0, 1.0);
@@ -30,8 +31,8 @@ Eigen::Vector3d within(const Eigen::Vector3d& vector, double length) {
 
 class HandServo final : public Policy {
  public:
-  HandServo(std::unique_ptr<Policy> policy, std::shared_ptr<const RobotModel> robot, const HandServoBounds& bounds)
-      : policy_(std::move(policy)), robot_(std::move(robot)), bounds_(bounds), arms_(robot_, policy_->name()) {
+  HandServo(std::unique_ptr<Policy> policy, std::shared_ptr<const RobotModel> robot, HandServoReach reach)
+      : policy_(std::move(policy)), robot_(std::move(robot)), reach_(reach), arms_(robot_, policy_->name()) {
     joints_ = Eigen::VectorXd::Zero(robot_->dof());
   }
 
@@ -40,6 +41,7 @@ class HandServo final : public Policy {
   void reset(const EpisodeContext& context) override {
     policy_->reset(context);
     on_ = is_hand_to_hand(context.task);
+    bounds_ = hand_servo_bounds(reach_, context.task);
     partner_.reset();
     planned_.clear();
     meeting_ = {};
@@ -84,7 +86,11 @@ class HandServo final : public Policy {
   };
 
   [[nodiscard]] bool is_at_rest() const { return joints_.isZero(0.0) && root_.isZero(0.0); }
-  [[nodiscard]] double held_out(int theirs) const { return eased(bounds_.low, bounds_.high, partner_.rise(theirs)); }
+  [[nodiscard]] double held_out(int theirs) const {
+    const double raised = eased(bounds_.low, bounds_.high, partner_.rise(theirs));
+    return bounds_.all_out > 0.0 ? std::max(raised, eased(bounds_.out, bounds_.all_out, partner_.approach(theirs)))
+                                 : raised;
+  }
   [[nodiscard]] double nearness(double distance) const { return 1.0 - eased(bounds_.near, bounds_.far, distance); }
 
   void remember(int tick, const std::vector<Reference>& plan) {
@@ -177,7 +183,8 @@ class HandServo final : public Policy {
 
   std::unique_ptr<Policy> policy_;
   std::shared_ptr<const RobotModel> robot_;  // shared with the policy
-  HandServoBounds bounds_;
+  HandServoReach reach_;
+  HandServoBounds bounds_;  // of the task
   ArmReach arms_;
   HandWatch partner_;
   std::vector<PlannedHands> planned_;  // of the last plan
@@ -191,9 +198,14 @@ class HandServo final : public Policy {
 
 bool is_hand_to_hand(Task task) { return definition_of(task).interaction.touch == Touch::kHands; }
 
+HandServoBounds hand_servo_bounds(HandServoReach reach, Task task) {
+  if (reach != HandServoReach::kWide || definition_of(task).interaction.touch_s <= kClasp) return {};
+  return {.far = 0.60, .near = 0.40, .out = 0.06, .all_out = 0.15};
+}
+
 std::unique_ptr<Policy> with_hand_servo(std::unique_ptr<Policy> policy, std::shared_ptr<const RobotModel> robot,
-                                        const HandServoBounds& bounds) {
-  return std::make_unique<HandServo>(std::move(policy), std::move(robot), bounds);
+                                        HandServoReach reach) {
+  return std::make_unique<HandServo>(std::move(policy), std::move(robot), reach);
 }
 
 }  // namespace duet

@@ -122,7 +122,8 @@ const Entry& find_entry(const std::string& name) {
 
 // Options that shipped policies and descriptors take beside their own.
 struct CommonOptions {
-  bool average = false, servo = false;
+  bool average = false;
+  HandServoReach servo = HandServoReach::kNone;
 };
 
 const FieldTable<CommonOptions>& common_options() {
@@ -133,21 +134,21 @@ const FieldTable<CommonOptions>& common_options() {
                       "the arm's name has to say `average`"},
           &CommonOptions::average),
       field<CommonOptions>({.name = kHandServo,
-                            .meaning = "of no control; in tasks of hand at hand, the arm's last decimetres go to the "
-                                       "partner's seen hand; the arm's name has to say `servo`"},
+                            .meaning = "in tasks of hand at hand, the arm's last decimetres (`wide`: in handshakes, "
+                                       "half a metre) go to the partner's seen hand; the arm's name has to say `servo`",
+                            .choices = {"false", "true", "wide"}},
                            &CommonOptions::servo)};
   return table;
 }
 
-bool takes(const Entry& entry, const PolicyOption& common) {
-  if (&entry == &kFunction || &entry == &kRegistered || entry.name == std::string_view("null")) return false;
-  return common.name != kHandServo || entry.role.role != ArmRole::kControl;
+bool takes(const Entry& entry) {
+  return &entry != &kFunction && &entry != &kRegistered && entry.name != std::string_view("null");
 }
 
 PolicyInfo info_of(const Entry& entry, const std::string& name) {
   PolicyInfo info = entry.info(name);
   for (PolicyOption& option : common_policy_options())
-    if (takes(entry, option)) info.options.push_back(std::move(option));
+    if (takes(entry)) info.options.push_back(std::move(option));
   return info;
 }
 
@@ -155,7 +156,7 @@ PolicyInfo info_of(const Entry& entry, const std::string& name) {
 CommonOptions take_common(const Entry& entry, const std::string& name, PolicyOptions& options) {
   PolicyOptions taken;
   for (const PolicyOption& option : common_policy_options())
-    if (takes(entry, option))
+    if (takes(entry))
       if (auto node = options.extract(option.name)) taken.insert(std::move(node));
   return read_options("policy", name, common_options(), taken);
 }
@@ -207,10 +208,10 @@ PolicyMaker policy_maker(const std::string& name, Robot robot, const PolicyOptio
   PolicyOptions own = options;
   const CommonOptions common = take_common(entry, name, own);
   PolicyMaker maker = entry.maker(name, robot, own);
-  if (!common.average && !common.servo) return maker;
+  if (!common.average && common.servo == HandServoReach::kNone) return maker;
   return [maker = std::move(maker), robot = std::move(robot), common] {
     std::unique_ptr<Policy> policy = maker();
-    if (common.servo) policy = with_hand_servo(std::move(policy), robot);
+    if (common.servo != HandServoReach::kNone) policy = with_hand_servo(std::move(policy), robot, common.servo);
     return common.average ? with_averaged_partner(std::move(policy)) : std::move(policy);
   };
 }

@@ -18,7 +18,7 @@ namespace duet {
 // stands), "dstar", "dp", ... A name that ends in ".yaml" is a policy descriptor's path and as good as one of them.
 std::vector<PolicyInfo> policies();
 std::vector<std::string> policy_names();
-// Options that shipped policies and descriptors take beside their own: average, and hand_servo, which no control takes.
+// Options that shipped policies, scripted ones too, and descriptors take beside their own: average and hand_servo.
 std::vector<PolicyOption> common_policy_options();
 PolicyInfo policy_info(const std::string& name);  // with the common options that it takes
 // The role of a policy in tables, whatever a suite calls it; a descriptor, and what a program adds, competes.

@@ -20,7 +20,7 @@ using test::g1;
 using test::thrown_message;
 using ::testing::HasSubstr;
 
-const HandServoBounds kBounds;
+const HandServoBounds kBounds = hand_servo_bounds(HandServoReach::kNear, Task::kHandshake);
 constexpr int kSeconds = 50;  // ticks
 
 bool same_reference(const Reference& a, const Reference& b) {
@@ -71,8 +71,9 @@ ObservationFrame facing() {
 // The references of two seconds in which the partner's hand is at `hand` after a fifth of a second. The robot is where
 // its plan wants it.
 std::vector<Reference> corrected(Task task, const Reference& wanted, const Eigen::Vector3d& hand,
-                                 const std::function<void(ObservationFrame&)>& disturb = {}) {
-  const std::unique_ptr<Policy> policy = with_hand_servo(std::make_unique<Holding>(wanted), g1());
+                                 const std::function<void(ObservationFrame&)>& disturb = {},
+                                 HandServoReach reach = HandServoReach::kNear) {
+  const std::unique_ptr<Policy> policy = with_hand_servo(std::make_unique<Holding>(wanted), g1(), reach);
   policy->reset({.task = task, .prompt = "", .start = facing().robot});
   ObservationHistory history;
   std::vector<Reference> references;
@@ -112,6 +113,30 @@ TEST(HandServo, LeavesAPlanToTheBitThatIsFarFromTheHand) {
     EXPECT_TRUE(same_reference(reference, offering()));
 }
 
+// Half a metre, in the task whose hands have to stay together.
+TEST(HandServo, GoesFartherInAHandshakeWhereItIsWide) {
+  const auto moves = [](Task task, HandServoReach reach) {
+    return !same_reference(corrected(task, offering(), held_out(kBounds.far + 0.15), {}, reach).back(), offering());
+  };
+  EXPECT_TRUE(moves(Task::kHandshake, HandServoReach::kWide));
+  EXPECT_FALSE(moves(Task::kHandshake, HandServoReach::kNear));
+  EXPECT_FALSE(moves(Task::kHighFive, HandServoReach::kWide));
+  EXPECT_FALSE(moves(Task::kHug, HandServoReach::kWide));
+}
+
+// A hand that comes towards the robot at the height at which it was is held out for the wide servo alone.
+TEST(HandServo, SeesALevelHandWhereItIsWide) {
+  const Eigen::Vector3d hand = held_out(-0.05);
+  const auto level = [&](ObservationFrame& frame) {
+    if (frame.partner.col(kRightHand) != hand) frame.partner.col(kRightHand) = Eigen::Vector3d(1.0, hand.y(), hand.z());
+  };
+  const auto last = [&](HandServoReach reach) {
+    return corrected(Task::kHandshake, offering(), hand, level, reach).back();
+  };
+  EXPECT_TRUE(same_reference(last(HandServoReach::kNear), offering()));
+  EXPECT_FALSE(same_reference(last(HandServoReach::kWide), offering()));
+}
+
 TEST(HandServo, LeavesAPlanToTheBitWhoseHandIsNearOneThatHangs) {
   Reference low = offering();
   low.X_WB.p += facing().partner.col(kRightHand) - hand_of(low);
@@ -149,7 +174,8 @@ TEST(HandServo, IsSmoothAndWithinLimitsWhateverItSees) {
       for (double& value : frame.partner.reshaped()) value += noise * random.normal();
     };
     for (const Eigen::Vector3d& hand : {held_out(0.08), held_out(0.2), held_out(-0.15, -0.1)})
-      expect_smooth(corrected(Task::kHighFive, offering(), hand, disturb), offering());
+      for (const HandServoReach reach : {HandServoReach::kNear, HandServoReach::kWide})
+        expect_smooth(corrected(Task::kHandshake, offering(), hand, disturb, reach), offering());
   }
 }
 
@@ -175,7 +201,7 @@ TEST(HandServo, AsksTheRootForWhatTheArmLacks) {
   EXPECT_GT(level(corrected(Task::kHighFive, stretched, beyond).back()), 0.02);
 }
 
-TEST(HandServo, IsAnOptionOfPoliciesThatCompete) {
+TEST(HandServo, IsAnOptionOfPoliciesAndOfScripts) {
   const RobotMotion motion = test::swinging_motion(100, 1);
   const auto corrects = [&](const PolicyOptions& options) {
     const std::unique_ptr<Policy> policy = make_policy("replay", g1(), options);
@@ -185,14 +211,14 @@ TEST(HandServo, IsAnOptionOfPoliciesThatCompete) {
   EXPECT_FALSE(corrects({}));
   EXPECT_FALSE(corrects({{kHandServo, "false"}}));
   EXPECT_TRUE(corrects({{kHandServo, "true"}}));
+  EXPECT_TRUE(corrects({{kHandServo, "wide"}}));
   EXPECT_EQ(policy_files("dstar", {{kHandServo, "true"}}).size(), policy_files("dstar").size());
   const auto refusal = [](const char* policy, const char* value) {
     return thrown_message<std::invalid_argument>([&] { make_policy(policy, g1(), {{kHandServo, value}}); });
   };
-  EXPECT_THAT(refusal("replay", "maybe"), HasSubstr("hand_servo"));
-  EXPECT_THAT(refusal("replay", "maybe"), HasSubstr("found 'maybe'"));
+  EXPECT_THAT(refusal("replay", "maybe"), HasSubstr("unknown hand_servo 'maybe'. Known: false, true, wide"));
   EXPECT_EQ(refusal("null", "true"), "policy 'null': expected no option, found 'hand_servo'");
-  EXPECT_EQ(refusal("patient", "true"), "policy 'patient': unknown option 'hand_servo'. Known: average");
+  EXPECT_NE(make_policy("patient", g1(), {{kHandServo, "wide"}}), nullptr);
 }
 
 TEST(HandServo, NeedsArms) {
