@@ -326,6 +326,7 @@ NetworkFile load_networks(const Descriptor& descriptor, const ControllerOptions&
   makers.push_back(policy.make);
   policy.make = [descriptor, makers] {
     std::vector<std::unique_ptr<Network>> networks;
+    networks.reserve(makers.size());
     for (const NetworkMaker& make : makers) networks.push_back(make());
     return compose_networks(descriptor, std::move(networks));
   };

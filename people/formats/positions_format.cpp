@@ -78,12 +78,14 @@ bool is_positions_file(const std::string& path) {
   return extension == ".npy" || (extension == ".npz" && is_positions_npz(path));
 }
 
+std::string in_folder(const std::string& folder, const std::string& name) { return fmt::format("{}/{}", folder, name); }
+
 bool recognises_positions(std::span<const std::string> paths) {
   for (const std::string& path : paths) {
     if (is_positions_file(path)) continue;
     const std::vector<std::string> names = names_in(path);
     if (std::none_of(names.begin(), names.end(),
-                     [&](const std::string& name) { return is_positions_file(path + "/" + name); }))
+                     [&](const std::string& name) { return is_positions_file(in_folder(path, name)); }))
       return false;
   }
   return true;
@@ -134,7 +136,7 @@ std::vector<ClipPlace> find_positions(std::span<const std::string> paths, const 
   for (const std::string& path : paths) {
     if (is_file(path)) files.push_back(path);
     for (const std::string& name : names_in(path))
-      if (is_positions_file(path + "/" + name)) files.push_back(path + "/" + name);
+      if (is_positions_file(in_folder(path, name))) files.push_back(in_folder(path, name));
   }
   std::vector<ClipPlace> places;
   std::vector<std::string> single;
