@@ -31,6 +31,7 @@ POLICIES = {
     "dp": "dp",
     "dstar_lead": "dstar, network `lead`",
     "dstar_lead+servo": "dstar, network `lead`, with the servo",
+    "dstar_lead+servo_wide": "dstar, network `lead`, with the wide servo",
     "dstar_lead+noise": "dstar, network `lead`, noise where told to begin",
     "dp_lead": "dp, network `lead`",
     "dp_lead+noise": "dp, network `lead`, noise where told to begin",
@@ -39,9 +40,10 @@ POLICIES = {
     "retrieval": "retrieval",
     "replay": "replay (knows the motion)",
     "replay+servo": "replay (knows the motion), with the servo",
+    "replay+servo_wide": "replay (knows the motion), with the wide servo",
     "null": "null (stands still)",
 }
-CONTROLS = {"waiting": "waiting (scripted, told the task, begins when its partner does)", "canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)"}
+CONTROLS = {"waiting": "waiting (scripted, told the task, begins when its partner does)", "canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)", "patient+servo_wide": "patient (scripted), with the wide servo"}
 CONDITIONS = ("act", "alone", "touch", "force", "reply", "stands")
 
 

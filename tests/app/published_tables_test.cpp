@@ -46,8 +46,12 @@ std::vector<MetricColumn> units_in(const std::string& file) {
 RankingSuite suite_in(const std::string& file) {
   const PolicyRole knows{ArmRole::kOracle, "knows the motion"};
   const PolicyRole scripted{ArmRole::kControl, "scripted"};
-  RankingSuite suite{
-      .roles = {{"replay", knows}, {"replay+servo", knows}, {"waiting", scripted}, {"vendor", scripted}}};
+  RankingSuite suite{.roles = {{"replay", knows},
+                               {"replay+servo", knows},
+                               {"replay+servo_wide", knows},
+                               {"waiting", scripted},
+                               {"patient+servo_wide", scripted},
+                               {"vendor", scripted}}};
   for (const std::string& line : lines_of(read_file(file))) {
     if (line.find(",suite,") == std::string::npos) continue;
     suite.label = line.find('"') != std::string::npos ? line.substr(line.find('"')) : line.substr(line.rfind(',') + 1);
