@@ -67,13 +67,14 @@ void hold(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memo
   const Assessment found = assess(rules, input, memory.bad, memory.last_now, true);
   if (found.level == StopLevel::kDamp) return enter(SafetyState::kDamp, found.cause, input.now, memory);
   if (found.level == StopLevel::kHold && found.cause != StopCause::kPlannerAge) memory.cause = found.cause;
-  memory.let_go = memory.let_go || !input.run;
+  const bool asks = input.stands ? input.run : input.stand;
+  memory.let_go = memory.let_go || (input.heard && !asks);
   if (!input.stands) {
     const bool well = assess(rules, input, memory.bad, memory.last_now, false).level < StopLevel::kHold;
-    if (well && input.stand) enter(SafetyState::kStand, StopCause::kNone, input.now, memory);
+    if (well && memory.let_go && asks) enter(SafetyState::kStand, StopCause::kNone, input.now, memory);
     return;
   }
-  const bool asked = memory.let_go && input.run && walk_waits_for(rules, input) == StopCause::kNone;
+  const bool asked = memory.let_go && asks && walk_waits_for(rules, input) == StopCause::kNone;
   if (found.level < StopLevel::kHold && (asked || may_return(rules, memory, input)))
     enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
 }

@@ -132,6 +132,7 @@ struct SafetyInput {
   bool arm = false;                    // the operator has armed (hardware/executors/executor.h); never set in a dry run
   bool stand = false, stands = false;  // asked to stand up; has stood up
   bool run = false;                    // asked to run, or to run again after a hold
+  bool heard = true;                   // the remote control, now; where it is not, nobody knows whether a key is held
 };
 
 // Times of the last bad states, the newest first.
@@ -183,7 +184,7 @@ struct SafetyMemory {
   double last_now = kNever;            // of the tick before
   std::string_view missing = {};       // why it was last not ready, while it listens
   bool commands = false;               // it has been armed: from then on the robot is never without commands
-  bool let_go = false;                 // since the hold began nobody has asked to run
+  bool let_go = false;                 // since the hold began the key that ends it was seen not to be held
   BadStates bad;
 };
 

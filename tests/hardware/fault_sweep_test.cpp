@@ -152,6 +152,25 @@ TEST(FaultSweep, TheSameStateAgainIsNoFaultAndNoNews) {
   EXPECT_EQ(robot.cause(), StopCause::kStateAge);
 }
 
+// The operator still has the key down with which it was made to run.
+TEST(FaultSweep, AGapOfStatesUnderAKeyThatIsHeldHolds) {
+  GuardedTwin robot;
+  robot.start();
+  robot.hold_key(RemoteKey::kA);
+  robot.run_for(0.1);
+  robot.spoil = [left = 30](Frames& f) mutable {
+    if (left-- > 0) f.clear();
+  };
+  robot.run_for(2.0);
+  EXPECT_EQ(robot.state(), SafetyState::kHold);
+  EXPECT_EQ(robot.cause(), StopCause::kStateAge);
+  robot.drop_key(RemoteKey::kA);
+  robot.run_for(0.1);
+  robot.hold_key(RemoteKey::kA);
+  robot.run_for(0.1);
+  EXPECT_EQ(robot.state(), SafetyState::kRun);
+}
+
 TEST(FaultSweep, EveryStateDroppedForAWhileDampsWithinATenthOfASecond) {
   GuardedTwin robot;
   robot.start();

@@ -223,6 +223,28 @@ TEST(SafetyMachine, AHoldEndsWhenAllIsWellAndTheOperatorAsksAnew) {
   EXPECT_EQ(robot.memory.state, SafetyState::kRun);
 }
 
+// A gap of states hides the key: it is not thereby let go.
+TEST(SafetyMachine, AKeyThatWasNotHeardWasNotLetGo) {
+  for (const bool stands : {true, false}) {
+    SimulatedSafety robot = in_state(stands ? SafetyState::kRun : SafetyState::kStand);
+    robot.input.stands = stands;
+    bool& key = stands ? robot.input.run : robot.input.stand;
+    key = true;
+    robot.input.foreign_writer = true;
+    robot.tick();
+    robot.input.foreign_writer = robot.input.heard = key = false;
+    robot.tick();
+    robot.input.heard = key = true;
+    robot.run_for(1.0);
+    EXPECT_EQ(robot.memory.state, SafetyState::kHold) << "held all the time, " << stands;
+    key = false;
+    robot.tick();
+    key = true;
+    robot.tick();
+    EXPECT_EQ(robot.memory.state, stands ? SafetyState::kRun : SafetyState::kStand);
+  }
+}
+
 TEST(SafetyMachine, APlannersHoldWithAnotherFaultDoesNotEndByItself) {
   SimulatedSafety robot = in_state(SafetyState::kRun);
   robot.run_for(0.7, cut(&SafetyInput::planner_at));
