@@ -69,12 +69,13 @@ void hold(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memo
   if (found.level == StopLevel::kHold && found.cause != StopCause::kPlannerAge) memory.cause = found.cause;
   const bool asks = input.stands ? input.run : input.stand;
   memory.let_go = memory.let_go || (input.heard && !asks);
+  const bool anew = memory.let_go && asks;
   if (!input.stands) {
     const bool well = assess(rules, input, memory.bad, memory.last_now, false).level < StopLevel::kHold;
-    if (well && memory.let_go && asks) enter(SafetyState::kStand, StopCause::kNone, input.now, memory);
+    if (well && anew) enter(SafetyState::kStand, StopCause::kNone, input.now, memory);
     return;
   }
-  const bool asked = memory.let_go && asks && walk_waits_for(rules, input) == StopCause::kNone;
+  const bool asked = anew && walk_waits_for(rules, input) == StopCause::kNone;
   if (found.level < StopLevel::kHold && (asked || may_return(rules, memory, input)))
     enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
 }

@@ -223,6 +223,24 @@ TEST(SafetyMachine, AHoldEndsWhenAllIsWellAndTheOperatorAsksAnew) {
   EXPECT_EQ(robot.memory.state, SafetyState::kRun);
 }
 
+TEST(SafetyMachine, AHoldEndsOnlyUprightAndOnItsFeet) {
+  for (const bool leans : {true, false}) {
+    SimulatedSafety robot = in_state(SafetyState::kRun);
+    const RobotHealth well = robot.input.health;
+    robot.input.foreign_writer = true;
+    robot.tick();
+    robot.input.foreign_writer = false;
+    (leans ? robot.input.health.tilt : robot.input.health.carried) = leans ? 0.3 : 0.2;
+    robot.tick();
+    robot.input.run = true;
+    robot.run_for(1.0);
+    EXPECT_EQ(robot.memory.state, SafetyState::kHold) << leans;
+    robot.input.health = well;
+    robot.tick();
+    EXPECT_EQ(robot.memory.state, SafetyState::kRun) << leans;
+  }
+}
+
 // A gap of states hides the key: it is not thereby let go.
 TEST(SafetyMachine, AKeyThatWasNotHeardWasNotLetGo) {
   for (const bool stands : {true, false}) {
