@@ -230,7 +230,6 @@ void RobotGuard::read_operator(double now) {
   if (fresh && reading_.remote.holds(kDeadMan)) next_.dead_man_at = now;
   next_.stop_key = stop_asked_ || (fresh && reading_.remote.asks_to_stop());
   stop_asked_ = false;
-  next_.heard = fresh;
   next_.stand = fresh && reading_.remote.holds(kStandUp);
   next_.run = fresh && reading_.remote.holds(kRun);
 }

@@ -68,7 +68,7 @@ void hold(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memo
   if (found.level == StopLevel::kDamp) return enter(SafetyState::kDamp, found.cause, input.now, memory);
   if (found.level == StopLevel::kHold && found.cause != StopCause::kPlannerAge) memory.cause = found.cause;
   const bool asks = input.stands ? input.run : input.stand;
-  memory.let_go = memory.let_go || (input.heard && !asks);
+  memory.let_go = memory.let_go || (input.remote_at == input.now && !asks);  // not heard: it may still be held
   const bool anew = memory.let_go && asks;
   if (!input.stands) {
     const bool well = assess(rules, input, memory.bad, memory.last_now, false).level < StopLevel::kHold;

@@ -132,7 +132,6 @@ struct SafetyInput {
   bool arm = false;                    // the operator has armed (hardware/executors/executor.h); never set in a dry run
   bool stand = false, stands = false;  // asked to stand up; has stood up
   bool run = false;                    // asked to run, or to run again after a hold
-  bool heard = true;                   // the remote control, now; where it is not, nobody knows whether a key is held
 };
 
 // Times of the last bad states, the newest first.

@@ -90,7 +90,7 @@ EDITS = {
         ('time to be ready', choice('input.now - memory.well_since >= rules.ready_time', 'true')),
         ('time of a hold', choice('input.now - memory.since <= rules.hold_time', 'true')),
         ('a hold ends by another press of the key', choice('memory.let_go && asks', 'asks')),
-        ('a hold: a key that was not heard was not let go', choice('input.heard && !asks', '!asks')),
+        ('a hold: a key that was not heard was not let go', choice('input.remote_at == input.now && !asks', '!asks')),
         ('a hold ends only where all is well', choice('found.level < StopLevel::kHold && (asked || may_return(rules, memory, input))', 'asked || may_return(rules, memory, input)')),
         ('a hold before it stood is none to run from', unless('!input.stands')),
         ('stand: dead-man switch', unless('level_of(input.now - input.dead_man_at, rules.remote) >= StopLevel::kHold')),

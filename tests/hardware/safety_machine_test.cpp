@@ -250,9 +250,9 @@ TEST(SafetyMachine, AKeyThatWasNotHeardWasNotLetGo) {
     key = true;
     robot.input.foreign_writer = true;
     robot.tick();
-    robot.input.foreign_writer = robot.input.heard = key = false;
-    robot.tick();
-    robot.input.heard = key = true;
+    robot.input.foreign_writer = key = false;
+    robot.tick([](SafetyInput& in) { in.remote_at = in.now - kTick; });
+    key = true;
     robot.run_for(1.0);
     EXPECT_EQ(robot.memory.state, SafetyState::kHold) << "held all the time, " << stands;
     key = false;

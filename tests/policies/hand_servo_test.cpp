@@ -174,8 +174,9 @@ TEST(HandServo, IsSmoothAndWithinLimitsWhateverItSees) {
       for (double& value : frame.partner.reshaped()) value += noise * random.normal();
     };
     for (const Eigen::Vector3d& hand : {held_out(0.08), held_out(0.2), held_out(-0.15, -0.1)})
-      for (const HandServoReach reach : {HandServoReach::kNear, HandServoReach::kWide})
-        expect_smooth(corrected(Task::kHandshake, offering(), hand, disturb, reach), offering());
+      for (const Task task : {Task::kHighFive, Task::kHandshake})
+        for (const HandServoReach reach : {HandServoReach::kNear, HandServoReach::kWide})
+          expect_smooth(corrected(task, offering(), hand, disturb, reach), offering());
   }
 }
 
