@@ -39,7 +39,7 @@ struct FactorialOutcomes {
   std::vector<int> clips;                  // of each episode
 
   [[nodiscard]] long episodes() const { return static_cast<long>(clips.size()); }
-  // Of those episodes alone whose place is true.
+  // The outcomes of those episodes alone whose place is true.
   [[nodiscard]] FactorialOutcomes only(const std::vector<bool>& chosen) const;
 };
 

@@ -22,7 +22,7 @@ namespace {
 
 constexpr const char* kEngineSwitch = "engine";
 
-// What a key means, whatever the engine calls it. A key that is not here is a switch of its own.
+// The meaning of a key, whatever the engine calls it. A key that is not here is a switch of its own.
 struct KeyGroup {
   std::string_view name;
   std::array<std::string_view, 10> keys;

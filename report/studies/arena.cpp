@@ -306,7 +306,7 @@ using PairFigure = double (*)(std::span<const double>, std::span<const double>);
 
 double tau_b_of(std::span<const double> a, std::span<const double> b) { return kendall(a, b).tau_b; }
 
-// Of every two engines, each controller as often as `times` says.
+// The figure of every two engines, each controller as often as `times` says.
 std::vector<double> of_pairs(const EngineMeans& means, std::span<const double> times, PairFigure figure) {
   std::vector<std::vector<double>> drawn(means.of_engine.size());
   for (std::size_t engine = 0; engine < drawn.size(); ++engine)

@@ -19,7 +19,7 @@
 namespace duet {
 namespace {
 
-// What is counted in an episode.
+// An outcome that is counted in an episode.
 struct CountedOutcome {
   std::string_view name, title;
   bool (*happened)(const EpisodeRow& row);
