@@ -59,10 +59,20 @@ bool is_shipped_card(const fs::path& card) {
   }
 }
 
-// A descriptor that names its card by a path stays where it is: a copy of it would not find the card.
-bool names_card_by_path(const SuitePolicy&) { return false; }
-bool names_card_by_path(const SuiteController& controller) {
-  return controller.use.ends_with(".yaml") && load_descriptor(controller.use).robot.ends_with(".yaml");
+// The card by which a controller's descriptor names its robot, where that is a path; "" otherwise.
+std::string card_by_path(const SuitePolicy&) { return ""; }
+std::string card_by_path(const SuiteController& controller) {
+  if (!controller.use.ends_with(".yaml")) return "";
+  const std::string robot = load_descriptor(controller.use).robot;
+  return robot.ends_with(".yaml") ? robot : "";
+}
+
+// A card, what it extends, and its URDF where that lies below the card's folder; others are found as networks are.
+std::vector<std::string> files_of_card(const std::string& path) {
+  const RobotCard card = parse_card(read_file(path), path);
+  std::vector<std::string> files = card.files;
+  if (const fs::path urdf = fs::path(path).parent_path() / card.urdf; fs::exists(urdf)) files.push_back(urdf.string());
+  return files;
 }
 
 class InputArchive {
@@ -124,15 +134,23 @@ class InputArchive {
   void keep_actor(const std::string& kind, Actor& actor) {
     const std::string of = fmt::format("{} {}", kind, actor.name);
     const std::string place = fmt::format("inputs/{}/{}/", kind == "policy" ? "policies" : "controllers", actor.name);
-    const bool stays = names_card_by_path(actor), descriptor = actor.use.ends_with(".yaml");
+    const bool descriptor = actor.use.ends_with(".yaml");
+    // A descriptor and the card that it names by a path stay as far from each other as they are.
+    std::string folder = fs::path(actor.use).parent_path().string();
+    if (const std::string card = card_by_path(actor); !card.empty()) {
+      std::vector<std::string> cards = files_of_card(card);
+      cards.push_back(actor.use);
+      folder = common_folder(cards);
+      cards.pop_back();
+      for (const std::string& file : cards) copy(of, "robot", file, place + from_folder(file, folder));
+    }
     const std::vector<HashedFile> files = identity_of(actor, files_).files;
-    if (stays) actor.use = from_folder(actor.use, folder_);
-    if (files.empty() && descriptor && !stays)  // its network is absent
-      actor.use = copy(of, "descriptor", actor.use, place + fs::path(actor.use).filename().string());
+    if (files.empty() && descriptor)  // its network is absent
+      actor.use = copy(of, "descriptor", actor.use, place + from_folder(actor.use, folder));
     for (const HashedFile& file : files) {
       const std::string name = fs::path(file.path).filename().string();
-      if (descriptor && !stays && file.role == "descriptor") {
-        actor.use = copy(of, file.role, file.path, place + name);
+      if (descriptor && file.role == "descriptor") {
+        actor.use = copy(of, file.role, file.path, place + from_folder(file.path, folder));
       } else if (file.role.starts_with("command ")) {
         copy(of, file.role, file.path, place + file.role.substr(8));
       } else {

@@ -76,8 +76,8 @@ TEST_F(KeptRun, HoldsWhatItWasMadeFrom) {
   EXPECT_EQ(index.at("files").at(3).at("kept"), false);
 }
 
-// A file that a controller's descriptor names by a path from its own folder is found from there alone.
-TEST_F(KeptRun, ADescriptorWithACardOfItsOwnStaysWhereItIs) {
+// A card that a controller's descriptor names by a path is found from the descriptor's folder alone: it is kept, too.
+TEST_F(KeptRun, ADescriptorIsKeptWithACardOfItsOwn) {
   fs::create_directories(scratch_ / "here/cards");
   for (const char* file : {"g1.yaml", "g1.urdf"})
     fs::copy(std::string(DUET_SOURCE_DIR) + "/robots/g1/" + file, scratch_ / (std::string("here/cards/") + file));
@@ -89,10 +89,16 @@ TEST_F(KeptRun, ADescriptorWithACardOfItsOwnStaysWhereItIs) {
   Suite suite = load_suite(scratch_ / "here/suite.yaml");
   suite.controllers = {{"mine", scratch_ / "here/mine.yaml", {}}, {"plain", scratch_ / "here/plain.yaml", {}}};
   const ArchivedSuite kept = archive_inputs(suite, scratch_ / "run");
-  EXPECT_EQ(kept.suite.controllers[0].use, "../here/mine.yaml");
+  EXPECT_EQ(kept.suite.controllers[0].use, "inputs/controllers/mine/mine.yaml");
   EXPECT_EQ(kept.suite.controllers[1].use, "inputs/controllers/plain/plain.yaml");
-  for (const RunInput& input : kept.inputs) EXPECT_FALSE(input.of == "controller mine" && input.kept) << input.role;
-  EXPECT_EQ(suite.card_of(suite.controllers[0]), scratch_ / "here/cards/g1.yaml");
+  fs::create_directories(scratch_ / "run");
+  keep_inputs(kept, scratch_ / "run");
+  fs::remove_all(scratch_ / "here/cards");
+  const std::string mine = scratch_ / "run/inputs/controllers/mine/";
+  Suite elsewhere = suite;
+  elsewhere.controllers[0].use = mine + "mine.yaml";
+  EXPECT_EQ(elsewhere.card_of(elsewhere.controllers[0]), mine + "cards/g1.yaml");
+  EXPECT_EQ(load_robot(mine + "cards/g1.yaml").name, "g1");  // with its URDF
 }
 
 TEST_F(KeptRun, IsVerifiedElsewhereWithoutTheOriginals) {
