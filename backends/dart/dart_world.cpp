@@ -192,9 +192,8 @@ bool DartWorld::step(const JointCommand& command, const RobotState& state, std::
   set_law(command, state);
   if (!forces_are_sensible() || !positions_are_sensible(state) || !velocities_are_sensible()) return false;
   skeleton_->computeForwardDynamics();
-  if (saturate()) skeleton_->computeForwardDynamics();
   if (!move()) return false;
-  if (saturate()) {  // because of what the contacts did: once more from the begin
+  if (saturate()) {  // with what contacts and stops did: once more from the begin
     base_->setVelocitiesStatic(V);
     for (std::size_t i = 0; i < hinges_.size(); ++i) hinges_[i]->setVelocity(0, state.v[static_cast<Eigen::Index>(i)]);
     skeleton_->computeForwardDynamics();
