@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <regex>
 #include <set>
 #include <sstream>
 
@@ -50,6 +51,7 @@ RankingSuite suite_in(const std::string& file) {
                                {"replay+servo", knows},
                                {"replay+servo_wide", knows},
                                {"waiting", scripted},
+                               {"waiting+servo_wide", scripted},
                                {"patient+servo_wide", scripted},
                                {"vendor", scripted}}};
   for (const std::string& line : lines_of(read_file(file))) {
@@ -101,6 +103,20 @@ TEST(PublishedArena, ItsBoardsAreWhatTheRowsSay) {
     EXPECT_EQ(lines_of(read_file(in("tables/" + table + "/arena.csv"))), lines_of(analysis_csv(arena_analysis(rows))))
         << table;
   }
+}
+
+// Who has the networks can verify and merge the rows from anywhere.
+TEST(PublishedSuites, NameNoDescriptorOutOfTheirFolder) {
+  const std::regex descriptor("use: \"?([^\",}]+\\.yaml)");
+  int found = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(in("published"))) {
+    if (!entry.is_directory()) continue;
+    const std::string suite = read_file((entry.path() / "suite.yaml").string());
+    for (std::sregex_iterator at(suite.begin(), suite.end(), descriptor), end; at != end; ++at, ++found)
+      EXPECT_TRUE((*at)[1].str().starts_with("inputs/") && std::filesystem::exists(entry.path() / (*at)[1].str()))
+          << entry.path() << ": " << (*at)[1];
+  }
+  EXPECT_GE(found, 5);
 }
 
 }  // namespace
