@@ -29,7 +29,7 @@ std::string build_folder() {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path().parent_path();
 }
 
-// What differs from machine to machine or from run to run: folders of tests, of the build and of the
+// Parts that differ from machine to machine or from run to run: folders of tests, of the build and of the
 // sources, engines that are built beside the benchmark's, nodes and processes, digests of programs and inputs (not
 // those that a test makes up of one digit).
 std::string normalised(std::string text) {

@@ -249,7 +249,7 @@ void RobotGuard::check_robot() {
   next_.health.carried = carried_;
 }
 
-// What the feet carry now, with the torques of gravity in the tick before.
+// The load of the feet now, with the torques of gravity in the tick before.
 void RobotGuard::weigh() {
   if (!reading_.any) return;
   const double now = feet_.carried(reading_.state, contact_.weight(), reading_.tau);

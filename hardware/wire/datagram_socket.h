@@ -55,7 +55,7 @@ class DatagramSocket {
   std::string path_;  // that is removed with it
 };
 
-// Whoever receives at a path, now or later: looks for them again ten times a second while nobody does.
+// The receivers at a path, now or later: looks for them again ten times a second while nobody does.
 class LocalPeer {
  public:
   explicit LocalPeer(std::string path) : path_(std::move(path)) {}

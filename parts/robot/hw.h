@@ -53,7 +53,7 @@ void add_checklist(CLI::App& hardware, Session& session);
 // The form of a configuration, as JSON for its log; "" where it names none. Throws InputError where it is required and
 // does not do; otherwise it is noted.
 std::string checked_form(Session& session, const std::string& config_path, const RobotConfig& config);
-// What a robot does when commands end, as its checklist has it, or that nobody knows; a sentence's end.
+// The behaviour of a robot when commands end, as its checklist has it, or that nobody knows; a sentence's end.
 std::string when_commands_end(const RobotConfig& config);
 
 // `duet hw see`: recorded estimates of a person into guard and policy.

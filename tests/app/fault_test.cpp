@@ -83,7 +83,7 @@ TEST_F(Faults, AnEngineThatStandsStillFailsItsScenesAndAllAreReported) {
   EXPECT_THAT(ended.text, AllOf(HasSubstr("pendulum"), HasSubstr("chain"), HasSubstr("stand")));
 }
 
-// What `validate --json` printed.
+// The output of `validate --json`.
 nlohmann::json certificate_of(const Ended& ended) {
   const std::size_t begin = ended.text.find('{');
   return begin == std::string::npos ? nlohmann::json() : nlohmann::json::parse(ended.text.substr(begin));

@@ -105,7 +105,7 @@ TEST(PublishedArena, ItsBoardsAreWhatTheRowsSay) {
   }
 }
 
-// Who has the networks can verify and merge the rows from anywhere.
+// Anybody with the networks can verify and merge the rows from anywhere.
 TEST(PublishedSuites, NameNoDescriptorOutOfTheirFolder) {
   const std::regex descriptor("use: \"?([^\",}]+\\.yaml)");
   int found = 0;

@@ -73,7 +73,7 @@ class Host : public ::testing::Test {
   static void step(Backend& backend, int times = 1) {
     for (int i = 0; i < times; ++i) backend.step(test::no_torque(*backend.scene().robot));
   }
-  // What the fourth step at most says.
+  // The message of the fourth step at the latest.
   static std::string said(const HostProgram& program) {
     return thrown_message<std::runtime_error>([&] {
       const auto backend = make_host_backend(scene(), program);

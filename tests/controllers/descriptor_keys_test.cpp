@@ -153,7 +153,7 @@ TEST(GatedClock, StartsAtItsPhasesWhereItIsToldToWalkAtOnceAndAfterAReset) {
   }
 }
 
-// What a clock shows after standing, by its tick: walking for 3 ticks, standing for 2, walking again.
+// The phase of a clock after standing, by its tick: walking for 3 ticks, standing for 2, walking again.
 TEST(GatedClock, RestartsRunsOnOrPausesAsItIsTold) {
   const std::pair<AfterStanding, std::vector<int>> cases[] = {{AfterStanding::kRestarts, {0, 1, 2, -1, -1, 0, 1}},
                                                               {AfterStanding::kRunsOn, {0, 1, 2, -1, -1, 5, 6}},

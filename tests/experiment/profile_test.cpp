@@ -164,7 +164,7 @@ TEST(ActuationLimits, APerturbationsActuationStandsBeforeTheProfiles) {
   EXPECT_EQ(bare.options, profile.options);
 }
 
-// What an outside user found by trying: the G1 with its card's gains falls at 1 ms without armature and at no usual
+// Found by an outside user: the G1 with its card's gains falls at 1 ms without armature and at no usual
 // step with it.
 TEST(ActuationLimits, OfTheG1AreBetweenTheStepsThatHoldAndThoseThatFall) {
   const std::shared_ptr<const RobotModel> robot = load_shared_robot();

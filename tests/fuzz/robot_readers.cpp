@@ -19,7 +19,7 @@ void read_robot(std::string_view bytes) {
 
 std::string urdf_sample(unsigned /*seed*/) { return test::kSmallUrdf; }
 
-// What is drafted of a URDF is a card, whatever the URDF is.
+// The draft from any URDF is a card.
 void draft_robot(std::string_view bytes) {
   const CardDraft draft = draft_card(std::string(bytes), "fuzz.urdf", "", "fuzz.urdf");
   try {

@@ -34,7 +34,7 @@ struct Fault {
   Since since = Since::kRunning;
 };
 
-// Of the robot's states.
+// Faults of the robot's states.
 std::function<void(GuardedTwin&)> states(const SpoiledFrames& spoil) {
   return [spoil](GuardedTwin& robot) { robot.spoil = spoil; };
 }
@@ -197,7 +197,7 @@ struct Reached {
   double after;  // [s]
 };
 
-// What was seen at the wire.
+// The record of the wire.
 struct Record {
   std::vector<Reached> path;
   long outside = 0;                            // commands

@@ -253,7 +253,7 @@ TEST(GuardedWorld, ThePersonIsSeenThirtyTimesASecondWhereTheClipHasThem) {
   EXPECT_EQ(behind.link.guard().status().bad_messages, 0);
 }
 
-// What the policy is shown, by tick.
+// The observations of the policy, by tick.
 class WatchingReference final : public ReferenceSource {
  public:
   void begin(const RobotState& start) override { reference_ = {start.X_WB, start.q}; }

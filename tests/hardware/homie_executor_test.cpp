@@ -190,7 +190,7 @@ TEST(HomieExecutor, AnotherWhoSteersHomieIsForeign) {
   EXPECT_EQ(executor.foreign_writers(1), 0);
 }
 
-// What HOMIE's processes would take without a word, seen by the stand-in.
+// The stand-in sees what HOMIE's processes would take without a word.
 TEST(FakeHomie, NoticesAWrongFingerprintAndASwappedChannel) {
   FakeHomie homie;
   LcmBuffer buffer;

@@ -296,7 +296,7 @@ TEST(NetworkDoor, ReportsAndStatusComeToWhoAsksWithTheKey) {
   SocketGuardLink planner(remote.there.guard, 0.001);
   DatagramSocket status = DatagramSocket::at_path(status_path(remote.there.guard));
   std::unique_ptr<LocalPeer> teller = std::make_unique<LocalPeer>(status_path(remote.here.guard));
-  // Whoever repeats what was asked does not lead the reports to themselves.
+  // A request that is repeated does not lead the reports to its sender.
   DatagramSocket attacker = DatagramSocket::to_address(at(remote.door->port()));
   remote.attack = [&] {
     if (!remote.tap->seen.empty()) (void)attacker.send(remote.tap->seen.back());
@@ -363,7 +363,7 @@ TEST(NetworkDoor, AnAnswerThatWasRecordedIsHeardOnce) {
   EXPECT_LE(remote.link->received() - before, 60) << "a second of reports may come that were asked for";
 }
 
-// What only the guard sends does not come back to it.
+// Messages that only the guard sends do not come back to it.
 TEST(NetworkDoor, AnAnswerThatIsSentBackIsNoMessage) {
   RemotePlanner remote;
   DatagramSocket mirror = DatagramSocket::to_address(at(remote.door->port()));

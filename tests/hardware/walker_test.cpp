@@ -253,7 +253,7 @@ TEST(HoldTrial, WbcSimStandsThroughEveryHold) {
   expect_to_stand("wbc_sim", {}, {.forward = 0.0, .seconds = 8.0});
 }
 
-// What the trials would see if a hold still damped.
+// The trials as they would be if a hold still damped.
 TEST(HoldTrial, ARobotThatIsDampedFalls) {
   if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
   TwinInProcess twin(test::twin_guard(), {.engine = "mujoco"},

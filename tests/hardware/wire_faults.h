@@ -1,4 +1,4 @@
-// What goes wrong between twin and guard, as functions of the states that are under way (GuardedTwin::spoil). Each
+// Faults between twin and guard, as functions of the states that are under way (GuardedTwin::spoil). Each
 // keeps what it needs; one is for one run.
 #pragma once
 

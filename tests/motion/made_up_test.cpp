@@ -1,4 +1,4 @@
-// What recordings lack and duet makes up: legs, a partner, gaps, frames between those of a low rate.
+// Parts that recordings lack and duet makes up: legs, a partner, gaps, frames between those of a low rate.
 #include "duet/motion/people/made_up.h"
 
 #include <gmock/gmock.h>
@@ -40,7 +40,7 @@ JointLayout upper_layout(const std::vector<std::string>& names = kEight) {
   return layout;
 }
 
-// Of the stand-in's columns those that the file has.
+// The columns of the stand-in that the file has.
 RawPeople upper_people(const InteractionClip& clip, const JointLayout& layout, const FileWorld& world = {}) {
   RawPeople people = test::standin_people(clip, layout, world);
   for (PointTracks& joints : people.joints) {

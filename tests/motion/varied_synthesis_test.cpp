@@ -100,7 +100,7 @@ TEST(VariedSynthesis, HandshakesCoverThoseOfPeople) {
   EXPECT_GT(quantile(touch, 0.9), 2.10);
 }
 
-// Of the heads of Kinder's ten people, from 1.51 to 1.74 m over the floor, and their bows, 35 to 60 degrees.
+// Heads of Kinder's ten people are from 1.51 to 1.74 m over the floor, and their bows, 35 to 60 degrees.
 TEST(VariedSynthesis, BodiesAreSmallAndTall) {
   const std::vector<double> heights = drawn(Task::kBend, "a.height", 100);
   EXPECT_LT(quantile(heights, 0.1), 1.62);
@@ -136,7 +136,7 @@ TEST(VariedSynthesis, ASideThatIsAskedForIsGivenMirroredOrNot) {
   EXPECT_EQ(mirrors.size(), 2U);
 }
 
-// Of those who have waited for the mean already, as many wait that long again as did in the first place.
+// As many of those who have waited for the mean wait that long again as did in the first place.
 TEST(VariedSynthesis, WaitsHaveNoMemory) {
   constexpr int kClips = 400;
   const std::vector<double> waits = drawn(Task::kHandshake, "wait", kClips, {.wait = 3.0});

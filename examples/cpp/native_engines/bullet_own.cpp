@@ -33,7 +33,7 @@ const std::vector<duet::EngineOption> kOptions = {
     duet::number_option("damping", 0.0, 0.0, 1.0, "of the multibody; its own 0.04 brakes a free fall within a second"),
     duet::choice_option("cone", {"cone", "pyramid"}, "of friction (SOLVER_DISABLE_IMPLICIT_CONE_FRICTION)")};
 
-// What a collision object stands for: a link of the robot, a capsule of the partner, or the ground.
+// A collision object stands for a link of the robot, a capsule of the partner, or the ground.
 struct Body {
   int link = -1, capsule = -1;
 };

@@ -96,7 +96,7 @@ class OdeOwn final : public own::OwnWorld {
   [[nodiscard]] std::string version() const override { return dODE_VERSION; }
 
  private:
-  // What a geom stands for: a link (0, 1, ...), the ground, or a capsule of the partner (kPartner, kPartner - 1, ...).
+  // A geom stands for a link (0, 1, ...), the ground, or a capsule of the partner (kPartner, kPartner - 1, ...).
   static constexpr int kGround = -1, kPartner = -2;
   static void tag(dGeomID geom, int what) { dGeomSetData(geom, reinterpret_cast<void*>(std::intptr_t{what})); }
   static int tag_of(dGeomID geom) { return static_cast<int>(reinterpret_cast<std::intptr_t>(dGeomGetData(geom))); }
