@@ -245,9 +245,12 @@ std::string find_again(const RunInput& input, const std::vector<std::string>& pl
 
 // The place where the actor finds its file on this machine; "" where it finds none.
 template <typename Actor>
-std::string place_now(const Actor& actor, const std::string& role) {
+std::string place_now(Actor actor, const std::string& role) {
   const auto given = actor.options.find(role);
-  if (given != actor.options.end() && fs::path(given->second).is_absolute() && !fs::exists(given->second)) return "";
+  if (given != actor.options.end() && fs::path(given->second).is_absolute() && !fs::exists(given->second)) {
+    if (!actor.use.ends_with(".yaml")) return "";
+    actor.options.erase(given);  // a descriptor may find it by itself
+  }
   for (const HashedFile& file : identity_of(actor).files)
     if (file.role == role) return file.path;
   return "";

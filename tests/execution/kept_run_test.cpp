@@ -101,6 +101,29 @@ TEST_F(KeptRun, ADescriptorIsKeptWithACardOfItsOwn) {
   EXPECT_EQ(load_robot(mine + "cards/g1.yaml").name, "g1");  // with its URDF
 }
 
+// A descriptor's network is where this machine has it, not where the other had it.
+TEST_F(KeptRun, ADescriptorFindsItsNetworkAmongWhatIsShared) {
+  fs::create_directories(scratch_ / "there/models");
+  fs::create_directories(scratch_ / "run");
+  write_file(scratch_ / "there/models/twist2_1017_20k.onnx", "a network");
+  fs::copy(std::string(DUET_SOURCE_DIR) + "/controllers/descriptors/twist2.yaml", scratch_ / "here/plain.yaml");
+  Suite suite = load_suite(scratch_ / "here/suite.yaml");
+  suite.policies = {{"replay", "replay", {}}};
+  suite.controllers = {{"plain", scratch_ / "here/plain.yaml", {}}};
+  const char* shared = std::getenv("DUET_SHARED");
+  const std::string before = shared == nullptr ? "" : shared;
+  setenv("DUET_SHARED", (scratch_ / "there").c_str(), 1);
+  const ArchivedSuite kept = archive_inputs(suite, scratch_ / "run");
+  keep_inputs(kept, scratch_ / "run");
+  fs::rename(scratch_ / "there", scratch_ / "elsewhere");
+  setenv("DUET_SHARED", (scratch_ / "elsewhere").c_str(), 1);
+  duet::Run run;
+  run.path = scratch_ / "run";
+  run.info.suite_yaml = resolved_yaml(kept.suite);
+  EXPECT_EQ(suite_of_run(run).controllers[0].options.at("network"), scratch_ / "elsewhere/models/twist2_1017_20k.onnx");
+  before.empty() ? unsetenv("DUET_SHARED") : setenv("DUET_SHARED", before.c_str(), 1);
+}
+
 TEST_F(KeptRun, IsVerifiedElsewhereWithoutTheOriginals) {
   make_run(load_suite(scratch_ / "here/suite.yaml"), scratch_ / "run");
   fs::rename(scratch_ / "run", scratch_ / "elsewhere");
