@@ -35,6 +35,8 @@ POLICIES = {
     "dstar_lead+noise": "dstar, network `lead`, noise where told to begin",
     "dp_lead": "dp, network `lead`",
     "dp_lead+noise": "dp, network `lead`, noise where told to begin",
+    "dstar_lead+noise+servo_wide": "dstar, network `lead`, noise where told to begin, with the wide servo",
+    "dp_lead+noise+servo_wide": "dp, network `lead`, noise where told to begin, with the wide servo",
     "dp_lead+servo": "dp, network `lead`, with the servo",
     "dstar_shuffled": "dstar, partner of another clip",
     "retrieval": "retrieval",
@@ -43,7 +45,7 @@ POLICIES = {
     "replay+servo_wide": "replay (knows the motion), with the wide servo",
     "null": "null (stands still)",
 }
-CONTROLS = {"waiting": "waiting (scripted, told the task, begins when its partner does)", "canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)", "patient+servo_wide": "patient (scripted), with the wide servo"}
+CONTROLS = {"waiting": "waiting (scripted, told the task, begins when its partner does)", "canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)", "patient+servo_wide": "patient (scripted), with the wide servo", "waiting+servo_wide": "waiting (scripted, told the task, begins when its partner does), with the wide servo"}
 CONDITIONS = ("act", "alone", "touch", "force", "reply", "stands")
 
 
