@@ -243,11 +243,23 @@ void refuse_robot_overlap(const Scene& scene, const RobotState& state) {
                                           links[point.other].name, point.depth));
 }
 
-void refuse_partner_overlap(const Scene& scene, const RobotState& state, const HumanJoints& joints) {
-  if (scene.partner != PartnerMode::kSolid) return;
+namespace {
+
+ContactPoint deepest_in_partner(const Scene& scene, const RobotState& state, const HumanJoints& joints) {
   MovingPartner partner;
   partner.set(joints, HumanJoints::Zero());
-  const ContactPoint point = deepest(scene, state, partner, true);
+  return deepest(scene, state, partner, true);
+}
+
+}  // namespace
+
+bool is_in_partner(const Scene& scene, const RobotState& state, const HumanJoints& joints) {
+  return scene.partner == PartnerMode::kSolid && deepest_in_partner(scene, state, joints).depth > kPartnerOverlap;
+}
+
+void refuse_partner_overlap(const Scene& scene, const RobotState& state, const HumanJoints& joints) {
+  if (scene.partner != PartnerMode::kSolid) return;
+  const ContactPoint point = deepest_in_partner(scene, state, joints);
   if (point.depth <= kPartnerOverlap) return;
   throw std::invalid_argument(
       fmt::format("Backend::set_partner: {} (region {}) of the partner and {} overlap by {:.3f} m",

@@ -109,6 +109,8 @@ inline constexpr double kPartnerOverlap = 0.10;  // of a link with a capsule of 
 
 // For Backend::reset. Throws std::invalid_argument naming the deepest overlap beyond kRobotOverlap.
 void refuse_robot_overlap(const Scene& scene, const RobotState& state);
+// Whether a link lies deeper than kPartnerOverlap in the solid partner; false for a partner of another mode.
+bool is_in_partner(const Scene& scene, const RobotState& state, const HumanJoints& joints);
 // For the first Backend::set_partner after a reset: the same for the solid partner and kPartnerOverlap. A partner of
 // another mode is never refused.
 void refuse_partner_overlap(const Scene& scene, const RobotState& state, const HumanJoints& joints);

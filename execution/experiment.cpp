@@ -10,6 +10,7 @@
 #include "duet/archives/recording_file.h"
 #include "duet/backends/actuation.h"
 #include "duet/backends/engine_module.h"
+#include "duet/backends/narrow_phase.h"
 #include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "duet/core/robot_state.h"
@@ -152,6 +153,20 @@ EpisodeConditions Experiment::conditions(const EpisodeSpec& spec, const Pose& st
   return conditions;
 }
 
+// A start of `approach` that lies in a solid partner is drawn again.
+void Experiment::draw_clear_start(const EpisodeSpec& spec, const AdaptationOptions& options,
+                                  RolloutSetup& setup) const {
+  if (options.start != StartMode::kApproach || spec.engine == kPlaybackEngine) return;
+  constexpr int kMostDraws = 50;
+  const Scene scene = this->scene(spec);
+  const HumanJoints partner = partner_joints(episode_partner(setup).joints, 0);
+  for (int draw = 1; draw < kMostDraws && is_in_partner(scene, setup.start, partner); ++draw) {
+    const std::uint64_t seed = stream_key({"start", std::to_string(spec.seed), std::to_string(draw)});
+    setup.reference = adapt_by_phase(spec.clip->robot, spec.clip->phases, *spec.body->robot, options, seed);
+    setup.start = spec.body->robot->standing_state(setup.reference.motion.root.front());
+  }
+}
+
 RolloutSetup Experiment::setup(const EpisodeSpec& spec) const {
   const RobotModel& robot = *spec.body->robot;
   AdaptationOptions options;
@@ -162,6 +177,7 @@ RolloutSetup Experiment::setup(const EpisodeSpec& spec) const {
   static_cast<EpisodeConditions&>(setup) = conditions(spec, reference.motion.root.front());
   setup.clip = spec.clip;
   setup.reference = std::move(reference);
+  draw_clear_start(spec, options, setup);
   setup.prompt = spec.policy->prompt;
   if (spec.seen != nullptr)
     setup.seen_partner = partner_from_elsewhere(

@@ -94,6 +94,7 @@ class Experiment {
 
  private:
   [[nodiscard]] EpisodeConditions conditions(const EpisodeSpec& spec, const Pose& start) const;
+  void draw_clear_start(const EpisodeSpec& spec, const AdaptationOptions& options, RolloutSetup& setup) const;
   [[nodiscard]] bool keeps(const EpisodeRow& row, const EpisodeOverrides& overrides) const;
   template <typename Setup, typename Leader>
   Rollout executed(const EpisodeSpec& spec, const Setup& setup, Leader& leader, EpisodeRow& row) const;

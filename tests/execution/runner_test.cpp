@@ -9,6 +9,7 @@
 
 #include "duet/archives/recording_file.h"
 #include "duet/backends/engine_module.h"
+#include "duet/backends/narrow_phase.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
 #include "duet/core/machine.h"
@@ -287,6 +288,28 @@ TEST(Experiment, SceneHasThePerturbationsActuationAndElseTheProfiles) {
   EXPECT_EQ(perturbed.law, TorqueLaw::kExplicit);
   for (const RobotJoint& joint : perturbed.robot->joints) EXPECT_EQ(joint.armature, 0.0);
   EXPECT_EQ(spec.body->robot->joints[0].armature, test::g1()->joints[0].armature);  // the controller's
+}
+
+TEST(Experiment, NoApproachStartsInASolidPartner) {
+  Suite suite = test::playback_suite();
+  suite.engines = {"mujoco"};
+  suite.partner = SuitePartner::kSolid;
+  suite.start = SuiteStart::kApproach;
+  suite.start_radius = 4.0;
+  const auto experiment = test::experiment_of(suite, {test::paired(Task::kWave, *test::g1())});
+  int again = 0;
+  for (std::uint64_t seed = 0; seed < 600; ++seed) {
+    const EpisodeSpec spec = test::first_of(*experiment, seed);
+    const RolloutSetup setup = experiment->setup(spec);
+    const Scene scene = experiment->scene(spec);
+    const HumanJoints partner = partner_joints(episode_partner(setup).joints, 0);
+    EXPECT_FALSE(is_in_partner(scene, setup.start, partner)) << seed;
+    const AdaptationOptions options{.start = StartMode::kApproach, .start_radius = suite.start_radius};
+    const AdaptedMotion first =
+        adapt_by_phase(spec.clip->robot, spec.clip->phases, *spec.body->robot, options, spec.seed);
+    again += is_in_partner(scene, spec.body->robot->standing_state(first.motion.root.front()), partner);
+  }
+  EXPECT_GT(again, 0);
 }
 
 TEST(Parallel, EveryIndexOnceAndTheFirstExceptionComesBack) {
