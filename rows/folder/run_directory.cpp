@@ -7,6 +7,7 @@
 #include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -302,18 +303,18 @@ std::string lean_rows(const Run& run) {
   return text;
 }
 
-// A run names files by their places on its machine; what is published names them from the folder that it is published
-// from.
-std::string without_places(std::string text) {
-  for (std::size_t at = 0; (at = text.find("\"/", at)) != std::string::npos;) {
-    const std::size_t begin = at + 1, end = text.find('"', begin);
-    if (end == std::string::npos) break;
-    const fs::path place = text.substr(begin, end - begin);
-    const std::string from_here = place.lexically_proximate(fs::current_path()).string();
-    text.replace(begin, place.string().size(), from_here);
-    at = begin + from_here.size() + 1;
+// A run names files by their places on its machine, alone or in lists and settings; what is published names them from
+// the folder that it is published from.
+std::string without_places(const std::string& text) {
+  static const std::regex place("([\"':=,\\[])(/[^/\"':,\\]][^\"':,\\]]*)");
+  std::string result;
+  auto rest = text.begin();
+  for (std::sregex_iterator at(text.begin(), text.end(), place), end; at != end; ++at) {
+    result.append(rest, (*at)[2].first)
+        .append(fs::path((*at)[2].str()).lexically_proximate(fs::current_path()).string());
+    rest = (*at)[2].second;
   }
-  return text;
+  return result.append(rest, text.end());
 }
 
 nlohmann::json description_of(const Run& run) {

@@ -56,9 +56,17 @@ TEST_F(Published, DoesNotSayWhereItsMachineKeepsFiles) {
   RunInfo info = tiny_run();
   info.suite_yaml = "networks: [\"" + (here / "runs/a.safetensors").string() + "\", \"" +
                     (here.parent_path() / "b.onnx").string() + "\", c.onnx]\n";
+  info.argv = {"duet", "run", "clips.files=[" + (here / "a.npz").string() + "," + (here / "b.npz").string() + "]"};
+  info.environment["variables"] = {
+      {"DUET_ENGINES", (here / "engines").string() + ":" + (here.parent_path() / "lib").string()},
+      {"DUET_HOST", "http://host/a"}};
   RunDirectory::open(scratch_ / "placed", info).append(traced(0));
   publish_run(scratch_ / "placed", scratch_ / "tiny");
-  EXPECT_EQ(load_run(scratch_ / "tiny").info.suite_yaml, "networks: [\"runs/a.safetensors\", \"../b.onnx\", c.onnx]\n");
+  const RunInfo found = load_run(scratch_ / "tiny").info;
+  EXPECT_EQ(found.suite_yaml, "networks: [\"runs/a.safetensors\", \"../b.onnx\", c.onnx]\n");
+  EXPECT_EQ(found.argv.at(2), "clips.files=[a.npz,b.npz]");
+  EXPECT_EQ(found.environment.at("variables"),
+            (nlohmann::json{{"DUET_ENGINES", "engines:../lib"}, {"DUET_HOST", "http://host/a"}}));
 }
 
 TEST_F(Published, AChangedFileIsRefusedByName) {
