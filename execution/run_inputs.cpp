@@ -239,6 +239,8 @@ std::string find_again(const RunInput& input, const std::vector<std::string>& pl
   }
   const std::string expected =
       fmt::format("{}: {} '{}': expected SHA-256 {}", input.of, input.role, input.file, input.sha256);
+  if (found.empty() && places.empty())  // of an actor that does not load
+    throw MissingError(expected + ", found none: its network is not on this machine (DUET_MODELS, DUET_SHARED)");
   if (found.empty()) throw MissingError(fmt::format("{}, found none: looked at {}", expected, fmt::join(places, ", ")));
   throw InputError(fmt::format("{}, found {}", expected, fmt::join(found, ", ")));
 }
