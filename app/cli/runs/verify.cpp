@@ -1,6 +1,7 @@
 // duet verify: whether a run's rows are what its suite makes, and episodes of it run again.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <random>
 
 #include "duet/app/command.h"
@@ -54,7 +55,11 @@ std::string text_of(const Verification& found, const VerifyArguments& arguments,
   std::string text = fmt::format("{} {}{}\n", info.suite, info.suite_version, note.empty() ? "" : ": " + note);
   for (const std::string& fault : found.faults) text += fmt::format("WRONG     {}\n", fault);
   for (const std::string& missing : found.missing) text += fmt::format("MISSING   {}\n", missing);
-  for (const std::string& block : found.not_asked) text += fmt::format("LEFT OUT  {}\n", block);
+  constexpr std::size_t kShown = 3;
+  for (std::size_t i = 0; i < std::min(kShown, found.not_asked.size()); ++i)
+    text += fmt::format("LEFT OUT  {}\n", found.not_asked[i]);
+  if (found.not_asked.size() > kShown)
+    text += fmt::format("LEFT OUT  {} more that were not asked for (--json)\n", found.not_asked.size() - kShown);
   for (const RepeatedEpisode& repeat : found.repeats) text += line_of(repeat);
   if (found.asked < found.episodes)
     text += fmt::format("a part of its suite: {} of {} episodes were asked for\n", found.asked, found.episodes);
