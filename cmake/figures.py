@@ -279,7 +279,7 @@ def actuation(folder):
         for policy, arm in columns:
             some = [r for r in rows if (r["engine"], r["controller"], r["policy"], r["perturbation"]) == (engine, controller, policy, arm)]
             won = sum(bool(r["success"]) for r in some)
-            line.append(f"{short(won / len(some))} [{', '.join(wilson(won, len(some)))}]; {sum(r['fell'] for r in some)} of {len(some)}")
+            line.append(f"{short(won / len(some))} [{', '.join(wilson(won, len(some)))}]; {sum(r['fell'] for r in some)} of {len(some)}" if some else "not run")
         table.append(line)
     return markdown(["Engine", "Controller", *columns.values()], [False] * 2 + [True] * len(columns), table)
 
