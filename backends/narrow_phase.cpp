@@ -258,9 +258,8 @@ bool is_in_partner(const Scene& scene, const RobotState& state, const HumanJoint
 }
 
 void refuse_partner_overlap(const Scene& scene, const RobotState& state, const HumanJoints& joints) {
-  if (scene.partner != PartnerMode::kSolid) return;
+  if (!is_in_partner(scene, state, joints)) return;
   const ContactPoint point = deepest_in_partner(scene, state, joints);
-  if (point.depth <= kPartnerOverlap) return;
   throw std::invalid_argument(
       fmt::format("Backend::set_partner: {} (region {}) of the partner and {} overlap by {:.3f} m",
                   scene.human.capsules[point.other].name, scene.human.capsules[point.other].region,

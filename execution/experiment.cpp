@@ -156,7 +156,9 @@ EpisodeConditions Experiment::conditions(const EpisodeSpec& spec, const Pose& st
 // A start of `approach` that lies in a solid partner is drawn again.
 void Experiment::draw_clear_start(const EpisodeSpec& spec, const AdaptationOptions& options,
                                   RolloutSetup& setup) const {
-  if (options.start != StartMode::kApproach || spec.engine == kPlaybackEngine) return;
+  if (options.start != StartMode::kApproach || spec.engine == kPlaybackEngine ||
+      scene_mode(suite_.partner) != PartnerMode::kSolid)
+    return;
   constexpr int kMostDraws = 50;
   const Scene scene = this->scene(spec);
   const HumanJoints partner = partner_joints(episode_partner(setup).joints, 0);

@@ -67,7 +67,8 @@ std::string card_by_path(const SuiteController& controller) {
   return robot.ends_with(".yaml") ? robot : "";
 }
 
-// A card, what it extends, and its URDF where that lies below the card's folder; others are found as networks are.
+// The card first, then what it extends, and its URDF where that lies below the card's folder; others are found as
+// networks are.
 std::vector<std::string> files_of_card(const std::string& path) {
   const RobotCard card = parse_card(read_file(path), path);
   std::vector<std::string> files = card.files;
@@ -122,9 +123,7 @@ class InputArchive {
       robot = card.stem().string();
       return;
     }
-    const RobotCard parsed = parse_card(read_file(robot), robot);
-    std::vector<std::string> files = parsed.files;  // the card first, and what it extends
-    files.push_back((card.parent_path() / parsed.urdf).string());
+    const std::vector<std::string> files = files_of_card(robot);
     const std::string folder = common_folder(files);
     for (const std::string& file : files) copy("robot", "", file, "inputs/robot/" + from_folder(file, folder));
     robot = "inputs/robot/" + from_folder(files.front(), folder);

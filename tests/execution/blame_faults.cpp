@@ -15,7 +15,6 @@ using test::Fault;
 using test::NamedFault;
 
 constexpr std::array<const char*, 3> kEngines = {"mujoco", "bullet", "dart"};
-const int kJitters = BlameOptions{}.jitters;  // as the command has them
 
 struct Tally {
   int tried = 0;
@@ -48,7 +47,7 @@ Tally tally_of(const NamedFault& kind, const std::vector<std::unique_ptr<Experim
       const int number = begin + i;
       const Experiment& experiment = *experiments[static_cast<std::size_t>(number) % experiments.size()];
       const EpisodeSpec spec = experiment.at(number / std::ssize(experiments));
-      BlameOptions options{.engines = {kEngines.begin(), kEngines.end()}, .before = {}, .jitters = kJitters};
+      BlameOptions options{.engines = {kEngines.begin(), kEngines.end()}, .before = {}};
       options = with_fault(options, kind.fault, spec);
       found[static_cast<std::size_t>(i)] = blame_episode(experiment, spec, options, progress).culprit;
     });
